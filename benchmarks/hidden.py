@@ -27,7 +27,7 @@ SCALABLE = [name for name in CATALOGUE if name in SHOWN]
 
 def named(found) -> dict[str, tuple]:
     """{effect: (its class, IMUs)} of a procedure's answer."""
-    items = [*found.search.causes, *found.in_noise, *found.structural]
+    items = [*found.search.causes, *found.in_noise, *found.reading_faults]
     return {i.effect: ({i.effect, *found.rivals.get(i.effect, ())}, i.imus) for i in items}
 
 

@@ -28,7 +28,7 @@ def one(seed: int) -> dict:
     """The procedure on a clean recording; every fourth has rails."""
     recording, _ = make(Case(f"threshold-{seed}", rails=seed % 4 == 3), seed)
     found = run_procedure(recording)
-    named = [c.effect for c in (*found.structural, *found.search.causes, *found.in_noise)]
+    named = [c.effect for c in (*found.reading_faults, *found.search.causes, *found.in_noise)]
     row = {"seed": seed, "named": " ".join(named), "unexplained": found.unexplained}
     if not found.search.causes:
         tests: dict[str, float] = {}

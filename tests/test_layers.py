@@ -14,7 +14,7 @@ TOOL, PAPERS = (Path(package.__file__).parent for package in (imuarray, imuarray
 # Each rests on those above it, or beside it; the injector of the blind study on no model at all.
 LAYERS = {
     TOOL: (
-        ("errors", "caches", "linear", "tails"), ("compiled",),
+        ("errors", "caches", "linear", "tails", "threads"), ("compiled",),
         ("streams", "provenance", "geometry"), ("motion",), ("model",), ("words",),
         ("recording",), ("simulation", "firstorder", "estimation"), ("alignment", "engine"),
         ("posterior",), ("diagnosis",), ("pictures",), ("report", "plots"), ("trust",),
@@ -74,6 +74,6 @@ def test_short_jobs_do_not_wait_for_scipy_stats():
     """It is slow to import, and scipy.special has the laws that they need."""
     parts = "measured.positions", "measured.residuals", "claims", "figures.measured"
     papers = [f"imuarray_papers.{part}" for part in (*parts, "studies.checks.timing")]
-    names = ["imuarray.estimation.selection", *papers]
+    names = ["imuarray.analysis.selection", *papers]
     code = f"import sys, {', '.join(names)}; sys.exit('scipy.stats' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0

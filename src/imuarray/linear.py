@@ -44,9 +44,9 @@ def scaled_inverse(matrix, cutoff: float = FLOOR) -> np.ndarray:
 def scaled_square(matrix, vector, cutoff: float, scale=None) -> tuple[float, int]:
     """(vector' matrix^-1 vector, rank) within the directions above ``cutoff``: a score test's."""
     values, vectors, scale = scaled_eigh(matrix, scale)
-    seen = values > cutoff
-    along = vectors[:, seen].T @ (vector / scale)
-    return float(np.sum(along**2 / values[seen])), int(seen.sum())
+    informed = values > cutoff
+    along = vectors[:, informed].T @ (vector / scale)
+    return float(np.sum(along**2 / values[informed])), int(informed.sum())
 
 
 def shared_walk(time) -> np.ndarray:

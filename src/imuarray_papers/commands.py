@@ -18,7 +18,7 @@ def calibrate(arguments) -> None:
     """Positions by ML-BCD; `imuarray calibrate --model papers` finds the same faster."""
     output, recording = Output(arguments), read_recording(arguments.recording)
     search = partial(calibrate_bcd, tolerance=1e-9)
-    dataset = calibrate_papers(recording, arguments.accelerometer_noise, output.say, search)
+    dataset = calibrate_papers(recording, arguments.accelerometer_noise, output.notify, search)
     arguments.recordings = [arguments.recording]
     calibrating.written(dataset, [recording], arguments, output)
 
@@ -28,7 +28,7 @@ def sample(arguments) -> None:
     output, recording = Output(arguments), read_recording(arguments.recording)
     posterior = sampled(
         recording, arguments.method, arguments.steps, arguments.seed, arguments.rates,
-        arguments.accelerometer_noise, output.progress, output.say,
+        arguments.accelerometer_noise, output.progress, output.notify,
     )  # fmt: skip
     recording = assumed(recording, arguments.accelerometer_noise)
     reasons = reasons_of_poses(of_file(arguments.recording))

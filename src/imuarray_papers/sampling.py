@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.density import NOT_CONVERGED, Posterior, prior_of
-from imuarray.analysis.model import Say, assumed, silent, usable
+from imuarray.analysis.model import Notify, assumed, silent, usable
 from imuarray.analysis.noise import mode_of
 from imuarray.analysis.sampling import NUTS_STEPS, NUTS_WARMUP, tree_of
 from imuarray.engine.parameters import model_of
@@ -58,7 +58,7 @@ class Flat(NamedTuple):
         return log_density
 
 
-def flat(recording: Recording, rates: str = "declared", say: Say = silent) -> Flat:
+def flat(recording: Recording, rates: str = "declared", notify: Notify = silent) -> Flat:
     """The posterior of a recording under the flat motion prior and the declared noise.
 
     Around its mode; with ``rates="spread"`` p(omega | y_g) is that of equation (30).
@@ -71,7 +71,7 @@ def flat(recording: Recording, rates: str = "declared", say: Say = silent) -> Fl
         found = mode_of(recording, model)
         mode = found.positions
     if not found.converged:
-        say(NOT_CONVERGED)
+        notify(NOT_CONVERGED)
     likelihood = Likelihood.of(
         model, recording.specific_force, recording.angular_rate, recording.saturated_gyroscopes(),
         rate_distribution=density,
@@ -83,7 +83,7 @@ def flat(recording: Recording, rates: str = "declared", say: Say = silent) -> Fl
 def sample(
     recording: Recording, method: str = "pmmh", steps: int | None = None, seed: int = 0,
     rates: str = "declared", accelerometer_noise: float | None = None, progress: bool = False,
-    say: Say = silent,
+    notify: Notify = silent,
 ) -> xr.DataTree:  # fmt: skip
     """Chains of the positions' posterior; the options are those of `python -m imuarray_papers`.
 
@@ -92,17 +92,17 @@ def sample(
     InputError where the recording does not determine the positions.
     """
     require_one_of("rates", rates, RATES)
-    recording = usable(recording, say)
+    recording = usable(recording, notify)
     if rates == "spread":
-        recording = _off_rails(recording, say)
+        recording = _off_rails(recording, notify)
     recording = assumed(recording, accelerometer_noise)
-    target = flat(recording, rates, say)
-    say(f"the flat motion prior makes the array {target.shrinkage:.1f} posterior sds smaller than"
-        " it is (docs/findings.md)")  # fmt: skip
+    target = flat(recording, rates, notify)
+    notify(f"the flat motion prior makes the array {target.shrinkage:.1f} posterior sds smaller"
+        " than it is (docs/findings.md)")  # fmt: skip
     if method == "nuts":
         chains, attrs = _nuts(target, steps or NUTS_STEPS[0], seed, not progress), {}
     else:
-        chains, attrs = _pmmh(target, steps or STEPS, seed, not progress, say)
+        chains, attrs = _pmmh(target, steps or STEPS, seed, not progress, notify)
     key = digest(
         recording.time, recording.specific_force, recording.angular_rate, rates, method, steps,
         recording.accelerometer_noise_sd, code_digest(),
@@ -112,12 +112,13 @@ def sample(
     tree.attrs |= {"shrunk_by_sds": target.shrinkage, "on_a_line": int(fallen)}
     if fallen:
         tree.attrs["converged"] = 0
-        say("a chain went to where the triads lie on one line: the flat motion prior has no bound"
-            " there, and these triads are not far enough from it (docs/findings.md)")  # fmt: skip
+        notify("a chain went to where the triads lie on one line: the flat motion prior has no"
+            " bound there, and these triads are not far enough from it"
+            " (docs/findings.md)")  # fmt: skip
     return tree
 
 
-def _off_rails(recording: Recording, say: Say) -> Recording:
+def _off_rails(recording: Recording, notify: Notify) -> Recording:
     """Without samples whose gyroscopes' spread a rail has cut."""
     lost = recording.at_rail("gyroscope")
     if lost.all():
@@ -125,25 +126,25 @@ def _off_rails(recording: Recording, say: Say) -> Recording:
             "--rates spread: expected samples with all gyroscopes off their rail, found none"
         )
     if lost.any():
-        say(f"left out {lost.sum()} of {lost.size} samples with a gyroscope at its rail")
+        notify(f"left out {lost.sum()} of {lost.size} samples with a gyroscope at its rail")
     return recording.select(~lost) if lost.any() else recording
 
 
-def _pmmh(target: Flat, steps: int, seed: int, quiet: bool, say: Say) -> tuple[Chains, dict]:
+def _pmmh(target: Flat, steps: int, seed: int, quiet: bool, notify: Notify) -> tuple[Chains, dict]:
     """Two chains of PmMH, and N.
 
     N and the walk's length as in section III-C; where not even the largest N brings the variance
     of log p-hat near what is aimed at, omega is drawn around the integrand's mode.
     """
-    say("tuning N and the step length ...")
+    notify("tuning N and the step length ...")
     (recording, model, prior, mode, *_), rng = target.posterior, stream(seed, "sample", "tuning")
     sweeps = tuning.Sweeps(recording.position_prior_sd * np.geomspace(1e-6, 0.3, 16))
     found = tuning.tune(
         target.likelihood, prior, model.array.relative, lambda _: mode, sweeps, lambda _: rng
     )
     if found.centred:
-        say(f"variance of log p-hat {found.variances[-1]:.3g} at N = {sweeps.draws[-1]}: omega is"
-            " drawn around the integrand's mode instead")  # fmt: skip
+        notify(f"variance of log p-hat {found.variances[-1]:.3g} at N = {sweeps.draws[-1]}: omega"
+            " is drawn around the integrand's mode instead")  # fmt: skip
     starts = spread_starts(mode, prior.sd / 3, stream(seed, "sample", "starts"))
     thin = max(1, steps // STORED)
     chains = run_chains(

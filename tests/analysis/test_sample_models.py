@@ -51,7 +51,7 @@ def test_skewed_gyroscopes_are_found_and_sampled():
     """
     recording, truth = simulated(40, ["gyroscope_misalignment"])
     said = []
-    found, _ = fitted([recording], "sensors", (), said.append, bare=False)
+    found, _ = fitted([recording], "sensors", (), said.append, plain=False)
     assert any(line.startswith("gyroscope maps: kept") for line in said)
     posterior = posterior_beyond(recording, found)
     off = posterior.mode[:9] - (truth["position"].to_numpy()[1:]).ravel()

@@ -7,7 +7,7 @@ import pytest
 
 from imuarray.diagnosis.final_checks import Peak, clipped, together
 from imuarray.diagnosis.procedure import run_procedure
-from imuarray.diagnosis.reading_effects import Structural
+from imuarray.diagnosis.reading_effects import ReadingFault
 from imuarray_papers.blind.cases import Case, make
 
 LIMIT = -7.5
@@ -61,9 +61,9 @@ def test_false_alarms_in_noise():
 
 
 def test_findings_of_both_kinds_are_one_cause():
-    old = Structural("saturation", (1, 4), -20.0, {}, "piles")
-    new = Structural("saturation", (2,), -30.0, {}, "alone")
-    other = Structural("stale_samples", (0,), -40.0, {}, "repeats")
+    old = ReadingFault("saturation", (1, 4), -20.0, {}, "piles")
+    new = ReadingFault("saturation", (2,), -30.0, {}, "alone")
+    other = ReadingFault("stale_samples", (0,), -40.0, {}, "repeats")
     merged = together([old, other], [new])
     assert merged == [old._replace(imus=(1, 2, 4), log_p=-30.0), other]
 
@@ -81,10 +81,10 @@ def test_a_clipped_reading_is_named(recording):
     rate[place[0], 2, place[1]] *= 1 - 12 * recording.gyroscope_noise_sd / size[place]
     changed = replace(recording, angular_rate=rate)
     found = run_procedure(changed)
-    assert [(c.effect, c.imus) for c in found.structural] == [("saturation", (2,))]
+    assert [(c.effect, c.imus) for c in found.reading_faults] == [("saturation", (2,))]
     assert not found.unexplained and not found.search.causes
     struck = run_procedure(changed, without=("saturation", "heavy_tails"))
-    assert struck.unexplained and not struck.structural
+    assert struck.unexplained and not struck.reading_faults
 
 
 @pytest.mark.slow
@@ -93,4 +93,4 @@ def test_a_reading_far_off_anywhere_else_is_not_passed_over(recording):
     rate[400, 5, 1] += 12 * recording.gyroscope_noise_sd
     found = run_procedure(replace(recording, angular_rate=rate))
     assert found.unexplained or [c.effect for c in found.in_noise] == ["heavy_tails"]
-    assert not found.structural
+    assert not found.reading_faults

@@ -19,7 +19,7 @@ from imuarray.diagnosis.final_checks import beside_left
 from imuarray.diagnosis.fit import log_scores
 from imuarray.diagnosis.noise_effects import verdict
 from imuarray.diagnosis.procedure import run_procedure
-from imuarray.diagnosis.reading_effects import find_structural
+from imuarray.diagnosis.reading_effects import find_reading_faults
 from imuarray.diagnosis.residual_checks import all_checks, dependence, left_by_motion
 from imuarray.diagnosis.scans import Courses, maybe_grown
 from imuarray.diagnosis.scores import Candidate, Score
@@ -27,7 +27,7 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Cause, Search, eliminate, need
 from imuarray.engine.heldout import gain
 from imuarray.engine.parameters import catalogue_effects, columns_of
-from imuarray.engine.readings import Left, arrange
+from imuarray.engine.readings import ResidualMaps, arrange
 from imuarray.model import EFFECTS
 from imuarray.model.effects import KINDS, effect, known_effect
 from imuarray.recording import load_dataset, read_recording, write_recording
@@ -199,7 +199,7 @@ def test_what_first_order_says_it_left_is_no_fault_of_the_model():
     readings = arrange(replace(recording, angular_rate=rate))
     columns = columns_of(readings.array, catalogue_effects(), readings.position_prior_sd)
     search = Search(readings, columns, (), str).fitted()
-    left = Left(np.diag(np.repeat([0.0, 1e-6], 72)), np.zeros((8, 6, 4, 4)))
+    left = ResidualMaps(np.diag(np.repeat([0.0, 1e-6], 72)), np.zeros((8, 6, 4, 4)))
     corrected = replace(readings, left=left)
     least = [
         min(c.log_p for c in all_checks(*beside_left(found), found.noise) if "residual" in c.name)
@@ -441,11 +441,11 @@ def test_most_triads_decide_which_axes_are_right():
 
     recording, _ = make(Case("test-axes", (("axis_swap", (0, 1, 2)),), None, kind="one",
                              duration=DURATION), SEED)  # fmt: skip
-    causes, _, mended = find_structural(arrange(recording))
+    causes, _, mended = find_reading_faults(arrange(recording))
     assert mended and causes[0].imus == (0, 1, 2)
     recording, _ = make(Case("test-axes", (("axis_swap", ALL),), None, kind="one",
                              duration=DURATION), SEED)  # fmt: skip
-    causes, _, mended = find_structural(arrange(recording))
+    causes, _, mended = find_reading_faults(arrange(recording))
     assert causes[0].effect == "axis_swap"
     assert not mended or len(causes[0].imus) < 8
 
@@ -465,7 +465,7 @@ def test_readings_count_once(effects):
         *effects, kind="pair" if len(effects) > 1 else "one", realistic=True, duration=4
     )
     made = diagnose(make(case, SEED)[0], SEED, replicates=2)
-    parts = {i.effect: structural_gain(made.found, i)[2] for i in made.found.structural}
+    parts = {i.effect: structural_gain(made.found, i)[2] for i in made.found.reading_faults}
     assert set(parts) == {name for name, _ in effects}
     assert all(blocks.sum() > 1e5 for blocks in parts.values())
     made_fit = made.extended.fit

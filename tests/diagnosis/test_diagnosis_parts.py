@@ -78,11 +78,11 @@ def test_derivatives_are_those_of_finite_differences(clean):
 
     def residual(state, wanted=(0,)):
         # the motion's share would hide it: readings less prediction, whitened
-        seen = linearise(readings, columns, state, wanted)
-        left = seen.residual.reshape(len(seen.residual), -1)
-        return left + np.einsum("tri,ti->tr", seen.basis, seen.taken), seen
+        observed = linearise(readings, columns, state, wanted)
+        left = observed.residual.reshape(len(observed.residual), -1)
+        return left + np.einsum("tri,ti->tr", observed.basis, observed.absorbed), observed
 
-    here, seen = residual(state, None)
+    here, observed = residual(state, None)
     imu = 3
     for column in range(columns.size):
         if not columns.owner[imu, column]:
@@ -94,7 +94,7 @@ def test_derivatives_are_those_of_finite_differences(clean):
             other[imu, column] += sign * step
             moved.append(residual(columns.unflat(state, other))[0])
         slope = -(moved[0] - moved[1]).reshape(len(here), -1, 6)[:, imu] / (2 * step)
-        wanted = seen.whitened[:, imu, :, column]
+        wanted = observed.whitened[:, imu, :, column]
         scale = np.abs(wanted).max() + 1e-12
         assert np.abs(slope - wanted).max() < 2e-5 * scale, (columns.names[column], column)
 
@@ -302,8 +302,8 @@ def test_the_search_ends_at_the_optimum(effect):
     columns = columns_of(readings.array, free, readings.position_prior_sd)
     active, state = columns.owner, start(readings, columns)
     state, converged, _ = search_optimum(readings, columns, active, state, True, False)
-    seen = linearise(readings, columns, with_derivatives(readings, state, True))
-    information, score = summed_normal(seen, active)
+    observed = linearise(readings, columns, with_derivatives(readings, state, True))
+    information, score = summed_normal(observed, active)
     precision = columns.prior_precision(active)
     off = columns.flat(state)[active] - columns.prior_means()[active]
     step, sds = scaled_solve(information + precision, score - precision @ off)

@@ -54,12 +54,12 @@ def rough_recording(seed):
     aliases, phases = rng.uniform(-3, 3, count), rng.uniform(0, 1, count)
     maps = np.eye(3) + rng.normal(0, 0.01, (count, 3, 3))
     maps += np.eye(3) - maps.mean(axis=0)
-    seen, forces, rates = filtered(omega), [], []
+    observed, forces, rates = filtered(omega), [], []
     for place, alias, phase, own in zip(positions, aliases, phases, maps, strict=True):
         instants = host - PERIOD * ((alias * (host - host[0]) + phase) % 1)
         lever = np.cross(omega, np.cross(omega, place)) + np.cross(turning, place)
         forces.append(at(instants - BEHIND, time, filtered(lever + force)))
-        rates.append(at(instants, time, seen) @ own.T)
+        rates.append(at(instants, time, observed) @ own.T)
     forces, rates = np.stack(forces, axis=1), np.stack(rates, axis=1)
     recording = Recording(
         time=host, specific_force=forces + rng.normal(0, FORCE_SD, forces.shape),

@@ -12,7 +12,7 @@ from imuarray.engine.dataset import engine_dataset
 from imuarray.engine.estimate import Recorded, _passed, estimate, jackknifed, means, to_come
 from imuarray.engine.estimate import tested as at_more
 from imuarray.engine.forward import _of_one_truth, select_forward
-from imuarray.engine.linearise import linearise, reading, seen_again
+from imuarray.engine.linearise import linearise, reading, relinearised
 from imuarray.engine.normal import uncorrelated
 from imuarray.engine.parameters import POSITION, columns_of, stepped
 from imuarray.engine.readings import arrange, most_informative, resolution
@@ -21,9 +21,9 @@ from imuarray.engine.start import turned
 from imuarray.engine.widths import (
     _with_maps,
     hausman,
-    mask_of_left,
-    settled,
+    residual_map_mask,
     spread_of,
+    widened,
     widths,
 )
 from imuarray.errors import IdentifiabilityError, InputError
@@ -111,11 +111,11 @@ def test_another_state_is_seen_by_the_derivatives_of_one_near_by():
     columns = columns_of(readings.array, ("gyroscope_scale",), readings.position_prior_sd)
     state = Recorded.of(readings, columns).state
     seen = linearise(readings, columns, state)
-    for field, again in zip(seen, seen_again(readings, columns, state, seen), strict=True):
+    for field, again in zip(seen, relinearised(readings, columns, state, seen), strict=True):
         np.testing.assert_allclose(again, field, rtol=1e-9, atol=1e-9)
     rate, scale = state.motion[0, :3], np.full(4, 1e-3)
     moved = state._replace(parameters=np.repeat(scale, 3))
-    again = seen_again(readings, columns, moved, seen)
+    again = relinearised(readings, columns, moved, seen)
     change = np.zeros((4, 6))
     change[:, 3:] = -1e-3 * rate / readings.sd[:, 1:]
     basis = seen.basis[0]
@@ -161,7 +161,7 @@ def test_what_a_correction_left_widens_by_as_much_as_it_moves(kinds, again):
     # so small that the readings say nothing of it
     spread = 0.05**2 * np.outer(changes, changes)
     left, known = (
-        settled(again(fitted(replace(recording, map_covariance=part * spread), robust=False)))
+        widened(again(fitted(replace(recording, map_covariance=part * spread), robust=False)))
         for part in (1.0, 1e-6)
     )
     added = np.sqrt(widths(left)[1] ** 2 - widths(known)[1] ** 2)
@@ -182,7 +182,7 @@ def test_recordings_that_one_calibration_corrected_err_alike():
     sd = 2e-5
     left = arrange(replace(recording, map_covariance=sd**2 * np.eye(72)), sparse=True).left
     one, again, other = (
-        left._replace(taken=step * sd * np.ones(72), maps=(1 + step) * left.maps)
+        left._replace(removed=step * sd * np.ones(72), maps=(1 + step) * left.maps)
         for step in (0.0, 0.01, 0.2)
     )
 
@@ -192,7 +192,7 @@ def test_recordings_that_one_calibration_corrected_err_alike():
             replace(each, readings=replace(each.readings, left=own))
             for each, own in zip(bare.recorded, lefts, strict=True)
         )
-        return widths(settled(replace(bare, recorded=recorded)))[1] ** 2 - widths(bare)[1] ** 2
+        return widths(widened(replace(bare, recorded=recorded)))[1] ** 2 - widths(bare)[1] ** 2
 
     alone = added(one)
     for share, lefts in ((1.0, (one, again)), (0.55, (one, other))):
@@ -205,7 +205,7 @@ def test_maps_that_are_off_are_no_scatter_between_blocks():
     change = sd * rng.standard_normal((4, 3, 3))
     moved = recording.specific_force + np.einsum("kij,tkj->tki", change, recording.specific_force)
     spread = np.diag(np.repeat([sd**2, 1e-14], 36))
-    found = settled(jointly(replace(recording, specific_force=moved, map_covariance=spread)))
+    found = widened(jointly(replace(recording, specific_force=moved, map_covariance=spread)))
     _, formal, jackknife = widths(found)
     assert np.median(jackknife / formal) < 1.3
 
@@ -225,7 +225,7 @@ def test_one_step_beside_the_maps_is_the_whole_problem():
     )  # fmt: skip
     found = jointly(moved)
     left, now = [found.recorded[0].readings.left], _with_maps(found)
-    maps = mask_of_left(left, now.columns, now.active)
+    maps = residual_map_mask(left, now.columns, now.active)
     active, given = now.active | maps, now.active[now.active | maps]
     prior, values = np.zeros((len(given), len(given))), np.zeros(len(given))
     prior[np.ix_(given, given)] = found.precision
@@ -239,8 +239,8 @@ def test_one_step_beside_the_maps_is_the_whole_problem():
         step = np.linalg.solve(sum(inner for inner, _ in blocks) + prior, slope)
         state = stepped(now.recorded[0].state, now.columns, active, step)
         now, values = replace(now, recorded=(replace(now.recorded[0], state=state),)), values + step
-    first, whole = ((one.positions - found.positions)[1:] for one in (settled(found), now))
-    sds = position_sds(settled(found))
+    first, whole = ((one.positions - found.positions)[1:] for one in (widened(found), now))
+    sds = position_sds(widened(found))
     assert np.abs(step).max() < 1e-9 and np.abs(whole / sds).max() > 0.5
     assert np.abs((first - whole) / sds).max() < 0.1
 

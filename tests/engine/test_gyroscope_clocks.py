@@ -103,7 +103,7 @@ def test_phases_that_wander_and_jumps_that_jitter_are_found_reading_by_reading()
     prior = RoughPrior(nothing, nothing + 1e3, nothing)
     state = State(motion, np.zeros((8, 3)), np.empty(0), no_derivatives(len(ages), 8), prior)
     found = with_phases(readings, state, dict(enumerate(there.clocks)))
-    off = steady - np.floor(steady) - 0.5 + found.wander - ages / PERIOD
+    off = steady - np.floor(steady) - 0.5 + found.clock_deviation - ages / PERIOD
     # a turn common to all is the motion's; where the board hardly turns nothing tells
     off -= np.median(off, axis=1, keepdims=True)
     told = np.linalg.norm(there.turn, axis=1) > 200

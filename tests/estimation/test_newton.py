@@ -9,9 +9,9 @@ from imuarray.estimation import newton
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.information import arms, information, information_at
 from imuarray.estimation.newton import calibrate_gauss_newton, fisher_scoring
-from imuarray.estimation.threads import one_thread
 from imuarray.model import ArrayModel, Noise
 from imuarray.model.structure import products
+from imuarray.threads import one_thread
 from tests import oracles
 from tests.cases import measure, noises, simulate, small_array
 from tests.papers.test_bcd import problem, solution

@@ -176,7 +176,7 @@ def test_orientations_that_repeat_are_few():
         other, time=np.arange(len(both)) / RATE, specific_force=other.specific_force[both] + noise,
         angular_rate=other.angular_rate[both] + noise,
     )  # fmt: skip
-    assert calibrate_first_order(whole, gyroscopes="offset", others=[again]).spare == (1,)
+    assert calibrate_first_order(whole, gyroscopes="offset", others=[again]).left_out == (1,)
 
 
 def test_averaged_and_interpolated_readings_are_told_and_drifts_and_steps_are_not():

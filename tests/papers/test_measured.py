@@ -8,10 +8,10 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import multivariate_normal
 
+from imuarray.analysis.selection import select_dynamic
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.estimation.newton import calibrate_gauss_newton
-from imuarray.estimation.selection import select_dynamic
 from imuarray.geometry import mimu4444_corners
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting, normal_motion

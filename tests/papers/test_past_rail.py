@@ -61,7 +61,7 @@ def test_effects_beside_a_calibration_s_model_are_refused(withheld, found, tmp_p
     command = ["sample", str(log), "--out", str(tmp_path / "chains.nc"), "--model", str(path)]
     assert main([*command, "--effects", "gyroscope_scale"]) == 2
     assert "expected none with the model of a calibration" in capsys.readouterr().err
-    write_netcdf(found.assign_attrs(mended="axis_swap"), path)
+    write_netcdf(found.assign_attrs(corrected_readings="axis_swap"), path)
     with pytest.raises(InputError, match="right axes, found axis_swap"):
         imuarray.calibrate(recording, path)
     bare = found.drop_vars(["effect_parameter", "effect_sd", "whole_covariance", "parameter"])
@@ -94,7 +94,7 @@ def test_a_calibration_is_a_model_to_sample(withheld, found, tmp_path):
     """The density stands at the estimate from its effects: all coordinates within 5 sds."""
     recording, truth = withheld
     write_netcdf(found, tmp_path / "cal.nc")
-    estimate, _ = fitted([recording], str(tmp_path / "cal.nc"), (), print, bare=False)
+    estimate, _ = fitted([recording], str(tmp_path / "cal.nc"), (), print, plain=False)
     posterior = posterior_beyond(recording, estimate)
     assert posterior.model.effects == ("gyroscope_scale",)
     off = posterior.mode[:12] - truth["position"].to_numpy()[1:].ravel()

@@ -25,7 +25,7 @@ def test_samples_at_a_rail_are_left_out():
     recording, said = railed(15.0), []
     lost = recording.saturated_gyroscopes().any(axis=(1, 2))
     assert 0 < lost.sum() < lost.size
-    found = sample(recording, steps=20, rates="spread", say=said.append)
+    found = sample(recording, steps=20, rates="spread", notify=said.append)
     assert any(f"left out {lost.sum()} of {lost.size}" in line for line in said)
     assert np.all(np.isfinite(found["posterior"]["position"]))
 

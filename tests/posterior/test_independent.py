@@ -104,7 +104,7 @@ def test_where_it_is_not_enough_nuts_is_taken_and_that_is_told(monkeypatch):
         lost = imuarray.sample(recording, "papers")
     assert lost.attrs["sampler"] == "independent" and not lost.attrs["converged"]
     said: list[str] = []
-    other = imuarray.sample(recording, "papers", steps=250, say=said.append)
+    other = imuarray.sample(recording, "papers", steps=250, notify=said.append)
     assert other.attrs["sampler"] == "nuts" and "Pareto's k" in other.attrs["instead_of"]
     assert any(line.endswith("NUTS instead") for line in said)
     mine, theirs = (

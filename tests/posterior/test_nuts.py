@@ -101,7 +101,7 @@ def test_a_chain_that_falls_into_the_flat_priors_hole_is_told():
     recording, _ = imuarray.simulate(array, duration=5.0, sampling_rate=50.0, seed=1)
     said = []
     few = imuarray.select(recording, 20)
-    found = sampling.sample(few, "nuts", 100, 1, accelerometer_noise=0.04, say=said.append)
+    found = sampling.sample(few, "nuts", 100, 1, accelerometer_noise=0.04, notify=said.append)
     assert found.attrs["on_a_line"] and not found.attrs["converged"]
     assert any("no bound" in text for text in said)
 
@@ -109,11 +109,11 @@ def test_a_chain_that_falls_into_the_flat_priors_hole_is_told():
 def test_a_mode_that_was_not_reached_is_told(monkeypatch):
     recording, _ = imuarray.simulate(imuarray.mimu4444(), duration=2.0, sampling_rate=50.0, seed=1)
     said: list[str] = []
-    posterior_of(recording, say=said.append)
+    posterior_of(recording, notify=said.append)
     assert not said
     stopped = partial(newton.calibrate_gauss_newton, limit=1)
     monkeypatch.setattr(noise, "calibrate_gauss_newton", stopped)
-    posterior_of(recording, say=said.append)
+    posterior_of(recording, notify=said.append)
     (text,) = said
     assert "did not converge" in text
 

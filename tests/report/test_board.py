@@ -223,7 +223,7 @@ def test_a_log_as_read_is_corrected_as_the_calibration_s_was(found):
     assert np.abs(motions[0] - motions[1]).max() < 0.1 * raw.gyroscope_noise_sd
     said = reasons_of_motion(mine, found.calibration, as_read=True)
     assert any("offsets that have changed" in reason for reason in said)
-    swapped = found.calibration.assign_attrs(mended="axis_swap")
+    swapped = found.calibration.assign_attrs(corrected_readings="axis_swap")
     with pytest.raises(InputError, match="the right axes, found axis_swap"):
         imuarray.apply(swapped, raw)
 

@@ -12,6 +12,6 @@ with job(snakemake) as settings:
     recording = read_recording(snakemake.input.recording)
     found = diagnose(
         recording, settings["seed"], recording_path=snakemake.input.recording,
-        say=lambda text: print(text, flush=True),
+        notify=lambda text: print(text, flush=True),
     )  # fmt: skip
     write_report(found, Path(snakemake.output.diagnosis).parent)

@@ -7,7 +7,7 @@ with job(snakemake) as settings:
 
     import numpy as np
 
-    from imuarray.estimation.selection import select_dynamic
+    from imuarray.analysis.selection import select_dynamic
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording
     from imuarray.streams import stream

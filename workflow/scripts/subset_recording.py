@@ -5,7 +5,7 @@ from imuarray_papers.pipeline.job import job
 with job(snakemake) as settings:
     import pandas as pd
 
-    from imuarray.estimation.selection import select_dynamic
+    from imuarray.analysis.selection import select_dynamic
     from imuarray.provenance import stamp, write_csv
     from imuarray.recording import read_recording, write_recording
     from imuarray.streams import stream

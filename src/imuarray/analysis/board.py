@@ -5,7 +5,7 @@ from os import PathLike
 from pathlib import Path
 
 from imuarray.analysis.logs import open_logs
-from imuarray.analysis.model import Say, silent
+from imuarray.analysis.model import Notify, silent
 from imuarray.analysis.sensors import calibrate_sensors
 from imuarray.analysis.settings import SETTINGS
 from imuarray.errors import IdentifiabilityError, InputError, require
@@ -20,11 +20,11 @@ from imuarray.trust import of_first_order, reasons_of_calibration, reasons_of_po
 
 def board(
     logs: Sequence[str | PathLike], columns: str | PathLike | None = None,
-    gravity: float = GRAVITY, topics: Sequence[str] = (), say: Say = silent,
+    gravity: float = GRAVITY, topics: Sequence[str] = (), notify: Notify = silent,
 ) -> Board:  # fmt: skip
     """All that `imuarray board` finds of some logs, which `write_board` makes a page of.
 
-    ``gravity`` m/s^2; ``topics`` of bags; ``say`` is called with each remark on the work's course.
+    ``gravity`` m/s^2; ``topics`` of bags; ``notify`` is called with each remark.
     A log without still poses is calibrated as it is. InputError as of `open_logs`, `first_order`
     and `calibrate`, and for a recording that first order has corrected.
     """
@@ -36,10 +36,10 @@ def board(
     require(recording.correction is None, source, "a log, or a recording as read", other)
     samples, count = len(recording.time), len(recording.accelerometer_labels)
     require(samples >= SETTINGS.fewest, source, f"at least {SETTINGS.fewest} samples", samples)
-    say(f"{samples} samples of {count} IMUs; each sensor from still poses")
+    notify(f"{samples} samples of {count} IMUs; each sensor from still poses")
     found = _first_order(recording, gravity)
     if isinstance(found, str):
-        say(f"first order left out: {found}")
+        notify(f"first order left out: {found}")
         corrected = recording
         known = [
             f"first order was left out ({found}): offsets, scales and axes of the sensors are taken"
@@ -47,7 +47,7 @@ def board(
         ]
     else:
         corrected, known = correct(recording, found), reasons_of_poses(of_first_order(found))
-    say("positions from the motion")
+    notify("positions from the motion")
     calibration = calibrate_sensors([corrected])
     reasons = reasons_of_calibration(corrected, calibration, known)
     return Board(source, opened.lines, recording, found, corrected, calibration, reasons)

@@ -6,7 +6,7 @@ from os import PathLike
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis.model import Say, assumed, require_together, silent, usable
+from imuarray.analysis.model import Notify, assumed, require_together, silent, usable
 from imuarray.analysis.sensors import calibrate_sensors, finished
 from imuarray.engine.dataset import motion_variables, noise_variables, positions_dataset
 from imuarray.engine.parameters import model_of
@@ -18,7 +18,7 @@ from imuarray.recording import Recording
 def calibrate(
     recording: Recording | Sequence[Recording], model: str | PathLike = "sensors",
     effects: Sequence[str] = (), accelerometer_noise: float | None = None,
-    say: Say = silent,
+    notify: Notify = silent,
 ) -> xr.Dataset:  # fmt: skip
     """Accelerometer positions, sensor parameters and motion (docs/models.md).
 
@@ -36,7 +36,7 @@ def calibrate(
         Names of effects (docs/effects.md) to have in the model instead of those of ``model``.
     accelerometer_noise
         Of the papers' model: assumed sd in m/s^2, by default what the recording declares.
-    say
+    notify
         Called with each remark on the work's course.
 
     Returns
@@ -69,19 +69,19 @@ def calibrate(
     recordings = [recording] if isinstance(recording, Recording) else list(recording)
     require_together(model, recordings, effects, accelerometer_noise)
     if model == "papers":
-        return calibrate_papers(recordings[0], accelerometer_noise, say)
-    return calibrate_sensors(recordings, str(model), effects, say)
+        return calibrate_papers(recordings[0], accelerometer_noise, notify)
+    return calibrate_sensors(recordings, str(model), effects, notify)
 
 
 def calibrate_papers(
-    recording: Recording, accelerometer_noise: float | None = None, say: Say = silent,
+    recording: Recording, accelerometer_noise: float | None = None, notify: Notify = silent,
     search=calibrate_gauss_newton,
 ) -> xr.Dataset:  # fmt: skip
     """`calibrate` by maximum likelihood with the declared noise (paper 2017).
 
     ``search``: another search of the arguments of `calibrate_gauss_newton`.
     """
-    given, recording = recording, assumed(usable(recording, say), accelerometer_noise)
+    given, recording = recording, assumed(usable(recording, notify), accelerometer_noise)
     model = model_of(recording)
     whole, saturated = recording.in_memory(), recording.saturated_gyroscopes()
     found = search(model, whole.specific_force, whole.angular_rate, saturated=saturated)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
-from imuarray.analysis.model import Say, silent
+from imuarray.analysis.model import Notify, silent
 from imuarray.analysis.noise import (
     NoiseEstimate,
     estimated_noise,
@@ -57,20 +57,20 @@ class Posterior(NamedTuple):
         return np.eye(len(SCALES))[:, [SCALES.index(name) for name in self.scales]]
 
 
-def posterior_of(recording: Recording, known: bool = False, say: Say = silent) -> Posterior:
+def posterior_of(recording: Recording, known: bool = False, notify: Notify = silent) -> Posterior:
     """The posterior of a recording under the papers' model, around its mode.
 
     omega and omega_dot are normal of the recording's own size; that and the noise are unknown, with
     log-normal priors a factor of twenty wide. ``known``: whether the accelerometers' noise is the
     declared one.
     """
-    chosen, found, seen = estimated_noise(recording, known, say)
+    chosen, found, estimated = estimated_noise(recording, known, notify)
     if not found.converged:
-        say(NOT_CONVERGED)
+        notify(NOT_CONVERGED)
     # s is flat: differences between triads do not show it
-    chosen = replace(chosen, motion_sd=(*seen.motion_sd[:2], np.inf))
+    chosen = replace(chosen, motion_sd=(*estimated.motion_sd[:2], np.inf))
     free = [not known, True, True, True, False]
-    unknown = unknown_scales(recording, chosen, seen, np.zeros(3), len(recording.time))
+    unknown = unknown_scales(recording, chosen, estimated, np.zeros(3), len(recording.time))
     before, freedom = (part[free] for part in unknown)
     prior = prior_of(recording, chosen)
     return Posterior(
@@ -94,16 +94,16 @@ def posterior_beyond(recording: Recording, found: Estimate) -> Posterior:
     place = places_among(found, effects_of(found))[0][mine]
     precision = priors_of(found)[np.ix_(mine, mine)]
     inverse = scaled_inverse(found.information[np.ix_(mine, mine)] + precision)
-    readings, seen = _judged(found, inverse)
-    model = _model(recording, found, readings, seen.motion_sd)
+    readings, estimated = _judged(found, inverse)
+    model = _model(recording, found, readings, estimated.motion_sd)
     prior = prior_of(recording, model)
     mode = np.concatenate([found.positions[1:].ravel(), parameters_of(found, model)])
     mean, spread = mode.copy(), np.diag((SETTINGS.held * prior.sd) ** 2)
     mean[place], root = prior.mean[place], np.diag(1.0 / (SETTINGS.held * prior.sd))
     root[np.ix_(place, place)] = np.linalg.cholesky(precision).T
     spread[np.ix_(place, place)] = inverse
-    own = np.log(seen.motion_sd / model.motion_sd)
-    before, freedom = unknown_scales(recording, model, seen, own, len(readings.time))
+    own = np.log(estimated.motion_sd / model.motion_sd)
+    before, freedom = unknown_scales(recording, model, estimated, own, len(readings.time))
     motion = one.state.motion[:, :9]
     if model.needs_derivatives:
         motion = np.hstack([motion, *one.state.jerk])
@@ -147,12 +147,12 @@ def _judged(found: Estimate, covariance) -> tuple[Readings, NoiseEstimate]:
     squares = np.where(one.readings.exists, found.noise_sd() ** 2, np.nan)
     sds = np.broadcast_to(np.sqrt(np.nanmean(squares, axis=0)), squares.shape)
     readings = one.readings.with_noise(sds, None)
-    seen = noise_estimate(readings, found.columns, one.state, found.active, covariance)
-    return readings.with_sd(sds * factors(seen, readings.exists)), seen
+    estimated = noise_estimate(readings, found.columns, one.state, found.active, covariance)
+    return readings.with_sd(sds * factors(estimated, readings.exists)), estimated
 
 
 def unknown_scales(
-    recording: Recording, chosen: ArrayModel, seen: NoiseEstimate, own, samples: int
+    recording: Recording, chosen: ArrayModel, estimated: NoiseEstimate, own, samples: int
 ):  # fmt: skip
     """(prior means, degrees of freedom) (5,) of the logs of `SCALES`, 0 at the model ``chosen``.
 
@@ -162,7 +162,7 @@ def unknown_scales(
     ratios = [
         np.trace(getattr(declared, kind)) / np.trace(getattr(chosen.noise, kind)) for kind in KINDS
     ]
-    freedom = np.append(seen.freedom.sum(axis=0), np.full(3, 3.0 * samples))
+    freedom = np.append(estimated.freedom.sum(axis=0), np.full(3, 3.0 * samples))
     return np.append(0.5 * np.log(ratios), own), freedom
 
 
@@ -185,7 +185,7 @@ def log_extended(model: ArrayModel) -> Callable:
     return log_density
 
 
-def traced(posterior: Posterior, say: Say = silent):
+def traced(posterior: Posterior, notify: Notify = silent):
     """(log density, data): a function of theta (P,) and of arrays, to be compiled by JAX."""
     prior = posterior.prior
     if isinstance(prior, TiedPrior):
@@ -206,7 +206,7 @@ def traced(posterior: Posterior, say: Say = silent):
         spread=(apart, saturated.size - saturated.sum()), enough=SETTINGS.node_gap,
     )  # fmt: skip
     if found.gap > SETTINGS.node_gap:
-        say("gyroscopes that see little of the motion: the likelihood is good to"
+        notify("gyroscopes that see little of the motion: the likelihood is good to"
             f" {found.gap:.1g} nats only")  # fmt: skip
     return log_posterior, (
         found.data, found.nodes, found.log_weights, posterior.spread, prior.mean, prior.sd

@@ -12,11 +12,11 @@ from imuarray.model.effects import find_effects
 from imuarray.recording import Recording
 from imuarray.recording.channels import require_live
 
-Say = Callable[[str], None]
+Notify = Callable[[str], None]
 
 
 def silent(text: str) -> None:
-    """The default ``say``: what a notebook wants to hear of the work's course."""
+    """The default ``notify``: what a notebook wants to hear of the work's course."""
 
 
 def assumed(recording: Recording, accelerometer_noise: float | None) -> Recording:
@@ -30,7 +30,7 @@ def assumed(recording: Recording, accelerometer_noise: float | None) -> Recordin
     return replace(recording, accelerometer_noise_sd=accelerometer_noise)
 
 
-def usable(recording: Recording, say: Say = silent) -> Recording:
+def usable(recording: Recording, notify: Notify = silent) -> Recording:
     """The recording without still poses and samples with an accelerometer at its rail.
 
     InputError where that leaves none, and for constant or copied channels; IdentifiabilityError
@@ -41,11 +41,11 @@ def usable(recording: Recording, say: Say = silent) -> Recording:
     lost = recording.at_rail("accelerometer")
     require(not lost.all(), "recording", "samples off the rail", "every one at a rail")
     if lost.any():
-        say(f"left out {lost.sum()} of {lost.size} samples with an accelerometer at its rail")
+        notify(f"left out {lost.sum()} of {lost.size} samples with an accelerometer at its rail")
     if recording.still().any():
         # they say nothing about the positions, and cost as much as the others
         still = recording.still() & ~lost
-        say(f"left out {still.sum()} of {lost.size} samples of still poses")
+        notify(f"left out {still.sum()} of {lost.size} samples of still poses")
         lost = lost | still
         require(not lost.all(), "recording", "moving samples", "still poses only")
     return recording.select(~lost) if lost.any() else recording

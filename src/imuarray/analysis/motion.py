@@ -216,7 +216,7 @@ def _with_own_clocks(found, calibration: xr.Dataset, recording: Recording, covar
         return found, False
     moving = ~recording.still()
     rough = fused(recording, calibration, moving)
-    if rough.readings.wander is None:
+    if rough.readings.clock_deviation is None:
         return found, False
     whole, shared = rough.covariances(covariance)
     motion = [np.array(field) for field in found.estimate.motion[:3]]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.analysis.model import Say, silent
+from imuarray.analysis.model import Notify, silent
 from imuarray.analysis.settings import SETTINGS
 from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.linearise import CHUNK, State, chunk_at
@@ -38,17 +38,17 @@ def noise_estimate(
     samples, count = readings.values.shape[:2]
     squares, freedom, spread = np.zeros((count, 2)), np.zeros((count, 2)), []
     for start in range(0, samples, CHUNK):
-        seen = chunk_at(readings, columns, state, wanted, start)
+        linearised = chunk_at(readings, columns, state, wanted, start)
         keep = readings.keep[start : start + CHUNK]
-        pairs, through = pick(seen.through, few)
+        pairs, projected = pick(linearised.projected, few)
         for k in range(count):
-            basis, own = seen.basis[:, 6 * k : 6 * k + 6], np.flatnonzero(pairs[:, 0] == k)
-            left = -basis @ through
-            left[..., own] += seen.whitened[:, k][..., pairs[own, 1]]
-            taken = np.sum(basis**2, axis=2) + np.sum((left @ covariance) * left, axis=2)
-            squares[k] += np.sum(seen.residual[:, k].reshape(-1, 2, 3) ** 2, axis=(0, 2))
-            freedom[k] += np.sum((keep[:, k] * (1 - taken)).reshape(-1, 2, 3), axis=(0, 2))
-        roots = seen.inverse[..., :9].reshape(len(keep), -1, 3, 3)
+            basis, own = linearised.basis[:, 6 * k : 6 * k + 6], np.flatnonzero(pairs[:, 0] == k)
+            left = -basis @ projected
+            left[..., own] += linearised.whitened[:, k][..., pairs[own, 1]]
+            absorbed = np.sum(basis**2, axis=2) + np.sum((left @ covariance) * left, axis=2)
+            squares[k] += np.sum(linearised.residual[:, k].reshape(-1, 2, 3) ** 2, axis=(0, 2))
+            freedom[k] += np.sum((keep[:, k] * (1 - absorbed)).reshape(-1, 2, 3), axis=(0, 2))
+        roots = linearised.inverse[..., :9].reshape(len(keep), -1, 3, 3)
         spread.append(np.einsum("trki,trkj->tkij", roots, roots))
     every = np.concatenate(spread)
     sizes = [_size(state.motion[:, 3 * k : 3 * k + 3], every[:, k]) for k in range(3)]
@@ -66,7 +66,7 @@ def _size(estimates, covariances) -> float:
     return float(np.sqrt(found))
 
 
-def factors(seen: NoiseEstimate, exists, known: bool = False) -> np.ndarray:
+def factors(estimated: NoiseEstimate, exists, known: bool = False) -> np.ndarray:
     """By what the triads' sds are wrong (N, 2); 1 where they do not exist.
 
     And of accelerometers where theirs are ``known``. Of few triads, or with few degrees of freedom,
@@ -75,7 +75,7 @@ def factors(seen: NoiseEstimate, exists, known: bool = False) -> np.ndarray:
     out = np.ones(exists.shape)
     for kind in (1,) if known else (0, 1):
         own = exists[:, kind]
-        squares, freedom = seen.squares[own, kind], seen.freedom[own, kind]
+        squares, freedom = estimated.squares[own, kind], estimated.freedom[own, kind]
         if len(squares) < SETTINGS.apart[kind] or freedom.min() < SETTINGS.freedom:
             squares, freedom = squares.sum(), freedom.sum()
         if np.all(freedom >= 1):
@@ -114,7 +114,7 @@ def mode_of(recording: Recording, model: ArrayModel, start=None) -> Calibration:
 
 
 def estimated_noise(
-    recording: Recording, known: bool = False, say: Say = silent
+    recording: Recording, known: bool = False, notify: Notify = silent
 ) -> tuple[ArrayModel, Calibration, NoiseEstimate]:
     """The papers' model with the noise of each triad, its fit of a recording, and what that shows.
 
@@ -135,13 +135,13 @@ def estimated_noise(
         motion = np.hstack(found.motion.motion[:3])
         rest = no_derivatives(len(motion), len(found.positions))
         state = State(motion, found.positions, np.empty(0), rest)
-        seen = noise_estimate(readings, columns, state, columns.owner, found.covariance)
-        wrong = factors(seen, readings.exists, known)
+        estimated = noise_estimate(readings, columns, state, columns.owner, found.covariance)
+        wrong = factors(estimated, readings.exists, known)
         if np.abs(np.log(wrong)).max() < SETTINGS.enough:
             break
         if number == SETTINGS.rounds:
-            say("the estimates of noise and positions did not settle; the last ones are taken")
+            notify("the estimates of noise and positions did not settle; the last ones are taken")
             break
         readings = readings.with_sd(readings.sd * wrong)
         model = replace(model, noise=noise_of(readings))
-    return model, found, seen
+    return model, found, estimated

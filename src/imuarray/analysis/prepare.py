@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from imuarray.analysis.selection import select_dynamic
 from imuarray.errors import InputError, require, require_integer
 from imuarray.firstorder.correct import calibrate_first_order, correct
 from imuarray.geometry import Array
@@ -146,6 +147,4 @@ def select(recording: Recording, samples: int | None = None) -> Recording:
     """
     if samples is not None:
         require_integer("samples", samples)
-    from imuarray.estimation.selection import select_dynamic
-
     return recording.select(select_dynamic(recording).spread(samples))

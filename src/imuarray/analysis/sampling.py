@@ -18,7 +18,7 @@ from imuarray.analysis.density import (
     posterior_of,
     traced,
 )
-from imuarray.analysis.model import Say, assumed, require_together, silent, usable
+from imuarray.analysis.model import Notify, assumed, require_together, silent, usable
 from imuarray.analysis.sensors import fitted
 from imuarray.analysis.settings import SETTINGS
 from imuarray.engine.dataset import effects_of
@@ -43,7 +43,7 @@ NUTS_STEPS, NUTS_WARMUP = (1250, 750), 300
 def sample(
     recording: Recording, model: str | PathLike = "sensors", method: str = "auto",
     steps: int | None = None, seed: int = 0, effects: Sequence[str] = (),
-    accelerometer_noise: float | None = None, progress: bool = False, say: Say = silent,
+    accelerometer_noise: float | None = None, progress: bool = False, notify: Notify = silent,
 ) -> xr.DataTree:  # fmt: skip
     """Chains of the posterior of the accelerometers' positions.
 
@@ -70,7 +70,7 @@ def sample(
         kinds is unknown, log-normal about the declared one.
     progress
         Whether to show a bar.
-    say
+    notify
         Called with each remark on the work's course.
 
     Returns
@@ -92,26 +92,26 @@ def sample(
         require_integer("steps", steps)
     require_integer("seed", seed, 0)
     require_together(model, [recording], effects, accelerometer_noise)
-    moving, posterior = usable(recording, say), None
+    moving, posterior = usable(recording, notify), None
     if model != "papers":
-        found, _ = fitted([recording], str(model), effects, say, bare=False)
+        found, _ = fitted([recording], str(model), effects, notify, plain=False)
         if found is not None and effects_of(found):
             if not found.converged:
-                say(NOT_CONVERGED)
+                notify(NOT_CONVERGED)
             posterior = posterior_beyond(recording, found)
     if posterior is None:
         moving, known = assumed(moving, accelerometer_noise), accelerometer_noise is not None
-        posterior = posterior_of(moving, known, say)
+        posterior = posterior_of(moving, known, notify)
     if model != "papers":
         posterior = posterior._replace(size_sd=2.0 * common_sd(moving, posterior.model))
-    return _exact(posterior, method, steps, seed, not progress, say)
+    return _exact(posterior, method, steps, seed, not progress, notify)
 
 
 def _exact(
-    posterior: Posterior, method: str, steps: int | None, seed: int, quiet: bool, say: Say
+    posterior: Posterior, method: str, steps: int | None, seed: int, quiet: bool, notify: Notify
 ) -> xr.DataTree:
     """On the marginal likelihood: independent proposals, or NUTS where these are not enough."""
-    (log_density, data), mode = traced(posterior, say), posterior.mode
+    (log_density, data), mode = traced(posterior, notify), posterior.mode
     attrs: dict[str, Any] = {"sampler": "nuts"}
     if method != "nuts":
         names = "sample", "independent"
@@ -123,7 +123,7 @@ def _exact(
             attrs, key = {"sampler": "independent"}, _key(posterior, steps, seed, method)
             return tree_of(posterior, chains, attrs | {"pareto_k": k}, key, seed, bool(short))
         attrs |= {"pareto_k": k, "instead_of": short}
-        say(f"{short}: NUTS instead")
+        notify(f"{short}: NUTS instead")
     steps = steps or NUTS_STEPS[bool(posterior.model.effects)]
     # two starts some posterior sds from the mode: far away there are modes of others' own
     rng = stream(seed, "sample", "starts")

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis import methods
-from imuarray.analysis.model import Say, silent
+from imuarray.analysis.model import Notify, silent
 from imuarray.engine.dataset import engine_dataset, with_readings
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.forward import (
@@ -33,14 +33,14 @@ from imuarray.trust import effect_names, require_fit
 
 def calibrate_sensors(
     recordings: Sequence[Recording], model: str = "sensors", effects: Sequence[str] = (),
-    say: Say = silent,
+    notify: Notify = silent,
 ) -> xr.Dataset:  # fmt: skip
     """`imuarray.calibrate` by the engine: the sensor model, ``effects``, or a calibration's."""
     for one in recordings:
         require_live(one)
     require_apart(recordings)
     whole = [less_leak_by_others(one) for one in recordings]
-    found, groups = fitted(whole, str(model), effects, say)
+    found, groups = fitted(whole, str(model), effects, notify)
     assert found is not None  # for it is wanted in any case
     dataset = engine_dataset(whole, found)
     dataset.attrs["parts"] = json.dumps([group._asdict() for group in groups])
@@ -62,29 +62,30 @@ def _near_the_model() -> Iterator[None]:
 
 @_near_the_model()
 def fitted(
-    recordings: Sequence[Recording], model: str, effects: Sequence[str], say: Say,
-    bare: bool = True,
+    recordings: Sequence[Recording], model: str, effects: Sequence[str], notify: Notify,
+    plain: bool = True,
 ) -> tuple[Estimate | None, list[EffectGroup]]:  # fmt: skip
     """(estimate, groups tried) under a calibration's model, ``effects``, or the sensor model.
 
-    ``bare``: whether an estimate is wanted where no group of the sensor model gains, or can be
+    ``plain``: whether an estimate is wanted where no group of the sensor model gains, or can be
     tried; else it is None there. InputError where no model of the kind is near the readings.
     """
     if methods.is_file(model):
         try:
-            return again(recordings[0], load_dataset(Path(model)), say), []
+            return again(recordings[0], load_dataset(Path(model)), notify), []
         except InputError as error:
             raise InputError(f"--model {model}: {error}") from None
-    readings = [used(one, say) for one in recordings]
+    readings = [used(one, notify) for one in recordings]
     if effects:
         return with_effects(readings, effects), []
-    if not bare and not groups_of(readings):
+    if not plain and not groups_of(readings):
         return None, []
-    found, groups = select_forward(readings, bare=bare)
+    found, groups = select_forward(readings, plain=plain)
     for group in groups:
         verdict = "kept" if group.kept else "left out"
-        say(f"{group.name}: {verdict}, {group.gain:.3g} ({group.error:.2g}) nats on held-out time")
-    return found if bare or any(group.kept for group in groups) else None, groups
+        gained = f"{group.gain:.3g} ({group.error:.2g}) nats on held-out time"
+        notify(f"{group.name}: {verdict}, {gained}")
+    return found if plain or any(group.kept for group in groups) else None, groups
 
 
 def finished(dataset: xr.Dataset, recordings, model: str) -> xr.Dataset:
@@ -97,15 +98,15 @@ def finished(dataset: xr.Dataset, recordings, model: str) -> xr.Dataset:
     return dataset
 
 
-def again(recording: Recording, calibration: xr.Dataset, say: Say = silent) -> Estimate:
+def again(recording: Recording, calibration: xr.Dataset, notify: Notify = silent) -> Estimate:
     """The estimate of a recording from where a calibration has it.
 
     Of the effects' parameters those are free that the calibration has estimated. InputError for
     another dataset, or other IMUs.
     """
     require_fit(calibration, recording)
-    for name in str(calibration.attrs.get("mended", "")).split():
-        say(f"{name}: concerns readings, not the model; they are used as they are")
+    for name in str(calibration.attrs.get("corrected_readings", "")).split():
+        notify(f"{name}: concerns readings, not the model; they are used as they are")
     require("effect_parameter" in calibration, "", "a calibration with effects", "one without")
     effects, readings = effect_names(calibration), used(recording)
     origin, span = calibration.attrs["time_origin"], calibration.attrs["span"]
@@ -123,10 +124,10 @@ def again(recording: Recording, calibration: xr.Dataset, say: Say = silent) -> E
     return resumed(readings, columns, active & columns.owner, state)
 
 
-def used(recording: Recording, say: Say = silent) -> Readings:
+def used(recording: Recording, notify: Notify = silent) -> Readings:
     """The moving samples that a board is estimated from; InputError where there are none."""
     readings = arrange(recording, sparse=True)
-    found = most_informative(readings.select(determined(readings, 1)), say)
+    found = most_informative(readings.select(determined(readings, 1)), notify)
     rate = 1 / np.median(np.diff(recording.time)) if len(recording.time) > 1 else 0.0
     none = f"none, at {rate:.4g} samples a second; is the unit of time right?"
     require(len(found.time), "recording", "samples that determine the motion", none)

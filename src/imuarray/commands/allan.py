@@ -24,7 +24,7 @@ def run(arguments) -> None:
         write_bytes(saved(figure, ending), folder / f"allan.{ending}")
     write_csv(noise.spectrum, folder / "spectrum.csv")
     write_csv(noise.terms, folder / "noise.csv")
-    output.say("\n".join(lines(noise)))
+    output.notify("\n".join(lines(noise)))
     output.done({
         "out": str(folder), "rate_hz": noise.rate_hz, "stretches_s": noise.stretches_s,
         "terms": noise.terms.to_dict("records"),

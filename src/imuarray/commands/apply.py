@@ -48,7 +48,7 @@ def apply(arguments) -> None:
         "gyroscopes_averaged_sd_rad_s": average, "late_s": first.attrs["late_s"],
         "out": str(arguments.out),
     }  # fmt: skip
-    output.say("\n".join(report(found)))
+    output.notify("\n".join(report(found)))
     output.done(found, reasons)
 
 

@@ -19,7 +19,7 @@ def board(arguments) -> None:
         arguments.logs, arguments.columns, arguments.gravity, arguments.topics, output.step
     )
     write_board(found, arguments.out)
-    output.say("\n".join(answer(found, arguments.out)))
+    output.notify("\n".join(answer(found, arguments.out)))
     output.done(document(found.calibration) | {"out": str(arguments.out)}, found.reasons)
 
 

@@ -17,7 +17,7 @@ def calibrate(arguments) -> None:
     papers = arguments.model == "papers"
     recordings = [read_recording(path, papers) for path in arguments.recordings]
     noise = arguments.accelerometer_noise
-    dataset = calibrated(recordings, arguments.model, arguments.effects, noise, output.say)
+    dataset = calibrated(recordings, arguments.model, arguments.effects, noise, output.notify)
     written(dataset, recordings, arguments, output)
 
 
@@ -28,5 +28,5 @@ def written(dataset: xr.Dataset, recordings, arguments, output: Output) -> None:
         [assumed(one, arguments.accelerometer_noise) for one in recordings], dataset, known
     )
     write_netcdf(dataset.assign_attrs(trust(reasons)), arguments.out)
-    output.say(report(dataset))
+    output.notify(report(dataset))
     output.done(document(dataset) | {"out": str(arguments.out)}, reasons)

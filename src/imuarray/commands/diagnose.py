@@ -20,7 +20,7 @@ def diagnose(arguments) -> None:
     reasons += reasons_of_diagnosis(recording, found.document)
     found.document.update(trusted=not reasons, reasons=reasons)
     write_report(found, arguments.out)
-    output.say("\n".join([*report(found.document), f"report: {arguments.out / 'report.html'}"]))
+    output.notify("\n".join([*report(found.document), f"report: {arguments.out / 'report.html'}"]))
     output.done(found.document | {"out": str(arguments.out)}, reasons)
 
 

@@ -21,5 +21,5 @@ def run(arguments) -> None:
         raise InputError(f"{arguments.calibration}: {error}") from None
     write_bytes(text.encode(), arguments.out)
     count = calibration.sizes["accelerometer"]
-    output.say(f"{arguments.out}: {count} IMUs, {arguments.format}")
+    output.notify(f"{arguments.out}: {count} IMUs, {arguments.format}")
     output.done({"out": str(arguments.out), "format": arguments.format, "imus": count}, reasons)

@@ -22,7 +22,7 @@ class Output:
         self.progress = not arguments.quiet
         self.text = self.progress and not self.json
 
-    def say(self, text: str) -> None:
+    def notify(self, text: str) -> None:
         """One remark, at once."""
         if self.text:
             print(printable(text), flush=True)

@@ -32,7 +32,7 @@ def draft_columns(arguments) -> None:
     require(not out.exists(), str(out), "a new file", "one that is there already")
     text, asked = draft(arguments.data)
     write_bytes(text.encode(), out)
-    output.say("\n".join([f"{out}: a draft; look at", *(f"- {line}" for line in asked)]))
+    output.notify("\n".join([f"{out}: a draft; look at", *(f"- {line}" for line in asked)]))
     output.done({"out": str(out), "not_known": asked})
 
 
@@ -52,7 +52,7 @@ def _report(arguments, recording: Recording, lines: list[str]) -> None:
     seconds = float(recording.time[-1] - recording.time[0])
     rate = float(1 / np.median(np.diff(recording.time))) if samples > 1 else np.nan
     first = f"{arguments.out}: {samples} samples of {count} IMUs, {rate:.2f} Hz, {seconds:.1f} s"
-    output.say("\n".join([first, *lines]))
+    output.notify("\n".join([first, *lines]))
     output.done({
         "out": str(arguments.out), "samples": samples, "accelerometers": count, "rate_hz": rate,
         "duration_s": seconds, "account": lines,
@@ -72,7 +72,7 @@ def simulate(arguments) -> None:
     origin = stamp({"board": arguments.board, **given}, arguments.seed)
     write_recording(recording, arguments.out, truth, origin)
     samples, accelerometers = recording.specific_force.shape[:2]
-    output.say(f"{arguments.out}: {samples} samples of {accelerometers} accelerometer triads")
+    output.notify(f"{arguments.out}: {samples} samples of {accelerometers} accelerometer triads")
     output.done({"out": str(arguments.out), "samples": samples, "accelerometers": accelerometers})
 
 
@@ -95,7 +95,7 @@ def first_order(arguments) -> None:
     write_corrected(recording, found, arguments.out)
     table, offsets = residual_table(found, recording), found.triads.offset
     ratios = noise_table(found, recording).groupby("sensor").ratio.median()
-    output.say("\n".join(summary_lines(found, recording)))
+    output.notify("\n".join(summary_lines(found, recording)))
     reasons = reasons_of_poses(of_first_order(found))
     output.done({
         "out": str(arguments.out), "poses": len(found.poses), "still_samples": found.still_samples,
@@ -110,7 +110,7 @@ def first_order(arguments) -> None:
 
 def select(arguments) -> None:
     """Select moving, unsaturated, informative samples."""
-    from imuarray.estimation.selection import select_dynamic
+    from imuarray.analysis.selection import select_dynamic
 
     recording, output = read_recording(arguments.recording, stored=True), Output(arguments)
     found = select_dynamic(recording)
@@ -123,7 +123,7 @@ def select(arguments) -> None:
     lines = [f"{len(recording.time)} samples"]
     lines += [f"{-count:7d} {words}" for words, count in found.removed.items()]
     lines.append(f"{len(found.informative)} informative, {len(index)} written to {arguments.out}")
-    output.say("\n".join(lines))
+    output.notify("\n".join(lines))
     output.done({
         "out": str(arguments.out), "samples": len(recording.time), "removed": found.removed,
         "informative": len(found.informative), "written": len(index),

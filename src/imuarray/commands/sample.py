@@ -27,7 +27,7 @@ def sample(arguments) -> None:
     recording = read_recording(arguments.recording)
     posterior = sampled(
         recording, arguments.model, arguments.method, arguments.steps, arguments.seed,
-        arguments.effects, arguments.accelerometer_noise, output.progress, output.say,
+        arguments.effects, arguments.accelerometer_noise, output.progress, output.notify,
     )  # fmt: skip
     recording = assumed(recording, arguments.accelerometer_noise)
     reasons = reasons_of_poses(of_file(arguments.recording))
@@ -40,7 +40,7 @@ def written(posterior: xr.DataTree, reasons: list[str], out: Path, output: Outpu
     posterior.attrs |= trust(reasons)
     write_netcdf(posterior, out)
     table = summary(posterior)
-    output.say(report(posterior, table))
+    output.notify(report(posterior, table))
     output.done(document(posterior, table) | {"out": str(out)}, reasons)
 
 

@@ -133,9 +133,9 @@ def attempt(search: Search, score, values) -> Search:
     whose = ", ".join(sensors_of(search.readings.labels, candidate.imus))
     words = f"{effect} {candidate.variant} of {whose}"
     if not keeps(search, score, gain, error):
-        search.say(f"refused {words}: held-out gain {gain:.1f} +- {error:.1f}")
+        search.notify(f"refused {words}: held-out gain {gain:.1f} +- {error:.1f}")
         return replace(search, refused=search.refused | {candidate})
-    search.say(
+    search.notify(
         f"adopted {words}: log p {score.log_p:.0f}, held-out gain {gain:.0f} +- {error:.0f} nats"
     )
     return replace(found, trace=(*search.trace, (effect, gain)))
@@ -233,8 +233,8 @@ def orthonormal(information, chosen, scale) -> np.ndarray:
     """(n, d) combinations of the n chosen parameters whose signals are orthonormal."""
     values, vectors, _ = scaled_eigh(information[np.ix_(chosen, chosen)], scale)
     # the rest are gauges of motion and positions: no data determine what else they resemble
-    seen = values > SETTINGS.visible
-    return vectors[:, seen] / np.sqrt(values[seen]) / scale[:, None]
+    informed = values > SETTINGS.visible
+    return vectors[:, informed] / np.sqrt(values[informed]) / scale[:, None]
 
 
 def squared_correlations(information, one, other) -> np.ndarray:
@@ -294,4 +294,4 @@ def _shared(given, fit_, candidate, left, signal) -> float:
     """Share of a signal's power that a candidate could explain."""
     chosen = given.places(mask_of(fit_.columns, candidate))
     block = left[np.ix_(chosen, chosen)]
-    return scaled_square(block, signal[chosen], SETTINGS.seen, given.scale[chosen])[0]
+    return scaled_square(block, signal[chosen], SETTINGS.observed, given.scale[chosen])[0]

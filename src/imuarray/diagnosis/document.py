@@ -24,13 +24,13 @@ from imuarray.engine.heldout import Scores, gain
 from imuarray.engine.parameters import POSITION
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.engine.widths import widths
-from imuarray.estimation.threads import one_thread
 from imuarray.linear import scaled_inverse
 from imuarray.model.array_model import component, unit_of
 from imuarray.model.effects import DATA_EFFECTS, KINDS, known_effect
 from imuarray.recording import Recording
 from imuarray.recording.channels import require_live
 from imuarray.streams import stream
+from imuarray.threads import one_thread
 from imuarray.words import (
     NARROW,
     first_up,
@@ -96,7 +96,7 @@ class Diagnosis:
 @one_thread()
 def diagnose(
     recording: Recording, seed: int = 0, without=(), recording_path: str | Path = "",
-    say: Callable[[str], None] = lambda text: None, replicates: int = SETTINGS.replicates,
+    notify: Callable[[str], None] = lambda text: None, replicates: int = SETTINGS.replicates,
 ) -> Diagnosis:  # fmt: skip
     """Test the papers' model on a recording and extend it.
 
@@ -104,17 +104,17 @@ def diagnose(
     constant and for copied channels.
     """
     require_live(recording)
-    found = run_procedure(recording, without, say)
+    found = run_procedure(recording, without, notify)
     search = found.search
-    say("fitting the papers' model to the same readings")
+    notify("fitting the papers' model to the same readings")
     extended = fitted(search.fit, search.given)
     nats = extended.scores.nats + nats_beside(found)
-    say("estimating the extended model's positions")
+    notify("estimating the extended model's positions")
     robust = resumed(found.whole, search.columns, search.active, search.fit.state)
     extended = replace(extended, scores=extended.scores._replace(nats=nats), robust=robust)
     base, inflated = rivals_of(found)
     rng = stream(seed, "diagnose", "replicates")
-    say("replicating the recording")
+    notify("replicating the recording")
     base, extended = (
         replace(m, discrepancies=discrepancies(m.fit, rng, replicates)) for m in (base, extended)
     )
@@ -167,7 +167,7 @@ def nats_beside(found: ProcedureResult) -> np.ndarray:
     beside = [item.blocks for item in found.in_noise if item.effect == COLOURED]
     # nor has any model's score the readings left out; exchanged axes are in the rivals' scores,
     # which take the readings as they are
-    left_out = [item for item in found.structural if DATA_EFFECTS[item.effect].left_out]
+    left_out = [item for item in found.reading_faults if DATA_EFFECTS[item.effect].left_out]
     beside += [structural_gain(found, item)[2] for item in left_out]
     return sum((blocks for blocks in beside if np.sum(blocks) > 0), np.zeros(ENGINE.blocks))
 
@@ -195,15 +195,15 @@ def rivals_of(found: ProcedureResult) -> tuple[Fitted, Fitted]:
     search, options = found.search, {"rough": True, "all_columns": False}
     alone = search.columns.mask([POSITION])
     start = found.base.state._replace(parameters=np.zeros_like(found.base.state.parameters))
-    bare = replace(search.readings, sd=search.readings.declared)
-    if found.structural:
+    declared_noise = replace(search.readings, sd=search.readings.declared)
+    if found.reading_faults:
         # as read: the rivals know neither of rails nor of repeats nor of exchanged axes
-        bare = replace(bare, values=found.raw.values)
-    declared = fit(bare, search.columns, alone, start, search.smooth, **options)
-    known = observable(bare, declared.basis)[..., None]
+        declared_noise = replace(declared_noise, values=found.raw.values)
+    declared = fit(declared_noise, search.columns, alone, start, search.smooth, **options)
+    known = observable(declared_noise, declared.basis)[..., None]
     squares = np.where(known, per_triad(standardised(declared)) ** 2, 1.0)
-    inflated_sd = bare.declared * np.maximum(np.sqrt(np.nanmean(squares, axis=-1)), 1e-3)
-    wide = bare.with_sd(inflated_sd)
+    inflated_sd = declared_noise.declared * np.maximum(np.sqrt(np.nanmean(squares, axis=-1)), 1e-3)
+    wide = declared_noise.with_sd(inflated_sd)
     again = fit(wide, search.columns, alone, declared.state, search.smooth, **options)
     return fitted(declared), fitted(again)
 
@@ -251,7 +251,7 @@ def causes_of(found: ProcedureResult, sds: np.ndarray) -> list[dict]:
     """All causes: of whole readings, of the means in the order of adoption, of the noise."""
     search, labels = found.search, found.search.readings.labels
     causes = []
-    for item in found.structural:
+    for item in found.reading_faults:
         nats = structural_gain(found, item)[:2]
         if not item.doubtful or nats[0] > 0:
             causes.append(_entry(item, labels, item.parameters, nats, says=item.says))
@@ -303,8 +303,8 @@ def structural_gain(found: ProcedureResult, item) -> tuple[float, float, np.ndar
     mine = np.zeros_like(touched)
     mine[:, list(item.imus)] = touched[:, list(item.imus)]
     readings = replace(search.readings, values=values, keep=search.readings.keep | mine)
-    seen = at(readings, search.columns, search.active, search.fit.state, all_columns=False)
-    return held_out((seen.misfits - search.fit.misfits - mine.sum(axis=(1, 2))) / 2)
+    linearised = at(readings, search.columns, search.active, search.fit.state, all_columns=False)
+    return held_out((linearised.misfits - search.fit.misfits - mine.sum(axis=(1, 2))) / 2)
 
 
 def parameters_of(search: Search, cause: Cause, sds) -> dict:

@@ -12,14 +12,14 @@ import numpy as np
 from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.noise import Noise
-from imuarray.diagnosis.reading_effects import RAILS, Structural, rails_cause
+from imuarray.diagnosis.reading_effects import RAILS, ReadingFault, rails_cause
 from imuarray.diagnosis.residual_checks import Check, all_checks, normal_checks
 from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search, need
 from imuarray.engine.linearise import linearise
-from imuarray.engine.widths import mask_of_left, spread_of
+from imuarray.engine.widths import residual_map_mask, spread_of
 from imuarray.linear import scaled_solve
 from imuarray.model.effects import KINDS
 from imuarray.tails import log_normal
@@ -75,7 +75,7 @@ def clipped(found: list[Peak], limit: float) -> tuple[list[Peak], float]:
     return hit, least
 
 
-def leave_out_clips(search: Search, without=()) -> tuple[Search, list[Structural]]:
+def leave_out_clips(search: Search, without=()) -> tuple[Search, list[ReadingFault]]:
     """Without readings that fall short of their prediction far more than any other does."""
     hit, log_p = ([], 0.0) if RAILS in without else clipped(peaks(search), SETTINGS.check)
     if not hit:
@@ -89,7 +89,7 @@ def leave_out_clips(search: Search, without=()) -> tuple[Search, list[Structural
     return replace(search, allowed=search.allowed & ~lost), [found]
 
 
-def together(first: list[Structural], second: list[Structural]) -> list[Structural]:
+def together(first: list[ReadingFault], second: list[ReadingFault]) -> list[ReadingFault]:
     """Both lists, what is in both as one cause in the first's words."""
     names = {item.effect: item for item in first}
     for new in second:
@@ -115,7 +115,7 @@ def beside_left(search: Search) -> tuple[Fit, Information]:
     """The fit and its information, one step on in maps as uncertain as their correction says."""
     made, given, columns = search.fit, search.given, search.columns
     left = search.readings.left
-    maps = mask_of_left([left], columns, made.active)
+    maps = residual_map_mask([left], columns, made.active)
     if not maps.any():
         return made, given
     place, every = given.places(maps), made.active | maps
@@ -151,8 +151,9 @@ def outlier_checks(search: Search) -> list[Check]:
     columns, kept = search.columns.in_use(search.active, state)
     state = columns.unflat(state, search.columns.flat(state)[:, kept])
     # derivatives as the fit had them: compiled already
-    seen = linearise(whole, columns, state, np.flatnonzero(search.active[:, kept].any(axis=0)))
-    missed = seen.residual + np.einsum("tri,ti->tr", seen.basis, seen.taken).reshape(away.shape)
+    made = linearise(whole, columns, state, np.flatnonzero(search.active[:, kept].any(axis=0)))
+    motion = np.einsum("tri,ti->tr", made.basis, made.absorbed)
+    missed = made.residual + motion.reshape(away.shape)
     predicted = np.nan_to_num(whole.values) / np.repeat(whole.sd, 3, axis=1) - missed
     change = np.diff(predicted, axis=0, prepend=predicted[:1])
     change[np.diff(whole.run, prepend=whole.run[0]) > 0] = 0.0

@@ -13,8 +13,8 @@ from imuarray.engine.linearise import (
     State,
     leverage_of,
     linearise,
-    seen_again,
-    through_of,
+    projection_of,
+    relinearised,
 )
 from imuarray.engine.normal import score_of, summed_normal
 from imuarray.engine.parameters import Columns, stepped
@@ -37,8 +37,8 @@ class Fit:
     whitened: np.ndarray  # (T, N, 6, w)
     basis: np.ndarray  # (T, 6 N, D)
     expected: np.ndarray
-    unexpected: np.ndarray
-    course: np.ndarray
+    innovation: np.ndarray
+    prior_slope: np.ndarray
     log_volume: np.ndarray  # (T,)
     misfits: np.ndarray  # (T,)
 
@@ -60,8 +60,8 @@ class Fit:
     def less_motion(self, values) -> np.ndarray:
         """Whitened readings (T, N, 6) without what the motion can explain of them."""
         flat = values.reshape(len(values), -1, 1)
-        taken = np.swapaxes(self.basis, 1, 2) @ flat
-        return (flat - self.basis @ taken).reshape(values.shape)
+        absorbed = np.swapaxes(self.basis, 1, 2) @ flat
+        return (flat - self.basis @ absorbed).reshape(values.shape)
 
     @property
     def described(self) -> np.ndarray:
@@ -73,7 +73,7 @@ class Fit:
         kept = self.active.any(axis=0)[self.wanted]
         return replace(
             self, wanted=self.wanted[kept], whitened=self.whitened[..., kept],
-            course=self.course[..., kept],
+            prior_slope=self.prior_slope[..., kept],
         )  # fmt: skip
 
     def along(self, step) -> np.ndarray:
@@ -86,10 +86,10 @@ class Fit:
         """Information (n, n) and score (n,) of the ``chosen`` (N, m) bool, of some samples."""
         return summed_normal(self, chosen[:, self.wanted], part)
 
-    def through(self, columns) -> np.ndarray:
+    def projected(self, columns) -> np.ndarray:
         """(T, N, D, n) some columns' coordinates in the motion's basis."""
         place = np.searchsorted(self.wanted, columns)
-        return through_of(self.basis, self.whitened[..., place])
+        return projection_of(self.basis, self.whitened[..., place])
 
     @property
     def free(self) -> int:
@@ -126,27 +126,28 @@ def search_optimum(readings, columns, active, state, smooth, rough):
     precision = columns.prior_precision(active)
     wanted = np.flatnonzero(active.any(axis=0))
     few = active[:, wanted]
-    converged, last, length, seen, near, predicted = False, np.inf, 1.0, None, False, np.inf
+    converged, last, length, linearised, near, predicted = False, np.inf, 1.0, None, False, np.inf
     enough = SETTINGS.rough_gain if rough else SETTINGS.fine_gain
     noisy = SETTINGS.noisy * (readings.keep.sum() - state.motion.size)
     for number in range(SETTINGS.steps):
         state = with_derivatives(readings, state, smooth)
         if near:
-            seen = seen_again(readings, columns, state, seen)
-            score = score_of(seen, few)
+            linearised = relinearised(readings, columns, state, linearised)
+            score = score_of(linearised, few)
         else:
-            seen = linearise(readings, columns, state, wanted, seen)
-            information, score = summed_normal(seen, few)
-        misfit, former = float(np.sum(seen.misfit)), predicted
+            linearised = linearise(readings, columns, state, wanted, linearised)
+            information, score = summed_normal(linearised, few)
+        misfit, former = float(np.sum(linearised.misfit)), predicted
         offset = columns.flat(state)[active] - prior_mean
         score = score - precision @ offset
         step, sds = scaled_solve(information + precision, score)
-        moved, in_motion = np.max(np.abs(step) / sds, initial=0.0), float(np.sum(seen.taken**2))
+        moved = np.max(np.abs(step) / sds, initial=0.0)
+        in_motion = float(np.sum(linearised.absorbed**2))
         predicted = score @ step + in_motion
-        still = moved < SETTINGS.converged and in_motion < 0.01 * len(seen.taken)
+        still = moved < SETTINGS.converged and in_motion < 0.01 * len(linearised.absorbed)
         if still or predicted < max(SETTINGS.least_step, enough * misfit):
             # what the last step leaves is of second order in what it predicted
-            state = advance(columns, state, active, step, few, seen, 1.0)
+            state = advance(columns, state, active, step, few, linearised, 1.0)
             converged = True
             break
         begun = predicted < SETTINGS.near_by * (former if near else misfit)
@@ -158,30 +159,33 @@ def search_optimum(readings, columns, active, state, smooth, rough):
         # full steps may alternate across a valley: half of them lead into it
         length = max(length / 2, SETTINGS.shortest) if cost > last else min(1.0, 1.2 * length)
         last = cost
-        state = advance(columns, state, active, step, few, seen, length)
+        state = advance(columns, state, active, step, few, linearised, length)
     parameters[:, kept] = columns.flat(state)
-    return whole.unflat(state, parameters), converged, seen
+    return whole.unflat(state, parameters), converged, linearised
 
 
-def advance(columns, state, active, step, few, seen: Eliminated, length) -> State:
+def advance(columns, state, active, step, few, linearised: Eliminated, length) -> State:
     """The state after ``length`` of a step of the active parameters, and the motion's own step."""
     step = length * step
     blocks = np.zeros(few.shape)
     blocks[few] = step
-    along = np.einsum("tkim,km->tki", seen.whitened, blocks, optimize=True)
-    moved = (along.reshape(len(along), 1, -1) @ seen.basis)[:, 0]
-    moved += np.einsum("tdi,tikm,km->td", seen.expected, seen.course, blocks, optimize=True)
-    move = np.einsum("tji,tj->ti", seen.inverse, seen.taken - moved)
+    along = np.einsum("tkim,km->tki", linearised.whitened, blocks, optimize=True)
+    moved = (along.reshape(len(along), 1, -1) @ linearised.basis)[:, 0]
+    moved += np.einsum(
+        "tdi,tikm,km->td", linearised.expected, linearised.prior_slope, blocks, optimize=True
+    )
+    move = np.einsum("tji,tj->ti", linearised.inverse, linearised.absorbed - moved)
     return stepped(state._replace(motion=state.motion + move), columns, active, step)
 
 
 def at(readings: Readings, columns: Columns, active, state: State, all_columns=True) -> Fit:
     """The fit's quantities at a state, with the derivative by every parameter or the active."""
     wanted = np.arange(columns.size) if all_columns else np.flatnonzero(active.any(axis=0))
-    seen = linearise(readings, columns, state, wanted)
+    linearised = linearise(readings, columns, state, wanted)
     return Fit(
-        readings, columns, state, active, wanted, seen.residual, seen.whitened, seen.basis,
-        seen.expected, seen.unexpected, seen.course, seen.log_volume, seen.misfit,
+        readings, columns, state, active, wanted, linearised.residual, linearised.whitened,
+        linearised.basis, linearised.expected, linearised.innovation, linearised.prior_slope,
+        linearised.log_volume, linearised.misfit,
     )  # fmt: skip
 
 
@@ -219,4 +223,4 @@ def log_scores(fit: Fit) -> Scores:
 def delay_score(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Each sample's score and information of each IMU's delay, (T, N) each, motion projected."""
     column = int(fit.columns.of(DELAY)[0])
-    return delay_parts(fit.residual, fit.whitened[..., column], fit.through([column])[..., 0])
+    return delay_parts(fit.residual, fit.whitened[..., column], fit.projected([column])[..., 0])

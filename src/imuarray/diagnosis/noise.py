@@ -13,7 +13,7 @@ import numpy as np
 from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.linearise import CHUNK, THREADS, leverage_of
-from imuarray.engine.normal import seen_through
+from imuarray.engine.normal import projected_columns
 from imuarray.engine.readings import Readings, by_triad, few_at_once
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.tails import QUARTILE, log_normal
@@ -168,11 +168,11 @@ def _with_former(fit: Fit, correlation, triads) -> np.ndarray:
     half, states = np.zeros((size, size)), np.zeros((len(triads), 1, 3, size))
     for start in range(0, len(fit.residual), CHUNK):
         part = slice(start, start + CHUNK)
-        through, blocks = seen_through(fit.whitened[part], fit.basis[part], mask)
+        projected, blocks = projected_columns(fit.whitened[part], fit.basis[part], mask)
         for number, (imu, kind) in enumerate(triads):
             axes, rho = slice(3 * kind, 3 * kind + 3), correlation[imu, kind]
             # derivatives of the triad's readings, the motion's share taken out
-            seen = -fit.basis[part, 6 * imu : 6 * imu + 6][:, axes] @ through
+            seen = -fit.basis[part, 6 * imu : 6 * imu + 6][:, axes] @ projected
             for _, places, block in (item for item in blocks if item[0] == imu):
                 seen[..., places] += block[:, axes]
             # the sum over samples before of rho^lag times theirs

@@ -17,7 +17,7 @@ from imuarray.diagnosis.final_checks import (
 )
 from imuarray.diagnosis.fit import Fit, fit
 from imuarray.diagnosis.noise_effects import COLOURED, SCALES, TAILS, NoiseCause
-from imuarray.diagnosis.reading_effects import Structural, find_structural
+from imuarray.diagnosis.reading_effects import ReadingFault, find_reading_faults
 from imuarray.diagnosis.residual_checks import Check, all_checks
 from imuarray.diagnosis.scores import Score, detectable
 from imuarray.diagnosis.settings import SETTINGS
@@ -40,7 +40,7 @@ class ProcedureResult:
     search: Search
     base: Fit
     base_scores: list[Score]
-    structural: list[Structural]
+    reading_faults: list[ReadingFault]
     in_noise: list[NoiseCause]
     checks: list[Check]
     explained: float  # share of the base model's excess misfit
@@ -51,36 +51,38 @@ class ProcedureResult:
 
 
 def run_procedure(
-    recording: Recording, without=(), say: Callable[[str], None] = lambda text: None
+    recording: Recording, without=(), notify: Callable[[str], None] = lambda text: None
 ) -> ProcedureResult:
     """Find what the papers' model gets wrong; effects in ``without`` are not in the catalogue.
 
     InputError where a recording has too few moving samples.
     """
-    raw, structural, whole, mended = prepared(recording, without)
+    raw, reading_faults, whole, corrected = prepared(recording, without)
     most = SETTINGS.searched // max(len(whole.labels) // SETTINGS.large, 1)
     raw, readings = part_of(raw, most), part_of(whole, most)
-    bare = columns_of(readings.array, (), readings.position_prior_sd)
-    effects = catalogue_effects(without, Recorded.of(readings, bare).smooth)
+    no_effects = columns_of(readings.array, (), readings.position_prior_sd)
+    effects = catalogue_effects(without, Recorded.of(readings, no_effects).smooth)
     # clocks are scanned for by what a delay would gain, whether or not it is a candidate
     described = effects if DELAY in effects else (*effects, DELAY)
     columns = columns_of(readings.array, described, readings.position_prior_sd)
-    say("fitting the papers' model, then looking for causes")
-    search = Search(readings, columns, effects, say).fitted()
+    notify("fitting the papers' model, then looking for causes")
+    search = Search(readings, columns, effects, notify).fitted()
     base, first = search.fit.only_active(), proposals(search)
     scores = [score for score, _ in first]
-    if not mended:
+    if not corrected:
         checks = all_checks(search.fit, search.given, search.noise)
         search = replace(search, detectable=detectable(search))
-        return ProcedureResult(search, base, scores, structural, [], checks, 0.0, True, raw, whole)
+        return ProcedureResult(
+            search, base, scores, reading_faults, [], checks, 0.0, True, raw, whole
+        )
     before, search = search.fit, drop_outliers(search)
     first = first if search.fit is before else None
     del before  # it has derivatives of its own
     search = adopt(search, first).light()
-    say("fitting to the end")
+    notify("fitting to the end")
     search = eliminate(search.refit(rough=False))
     search, clips = leave_out_clips(search, without)
-    say("judging the noise")
+    notify("judging the noise")
     search = search.light()
     search = with_outliers(search)
     shock, used = unshaken(search, without)
@@ -91,7 +93,7 @@ def run_procedure(
     if tailed:  # whose outliers may have hidden them
         search, more = leave_out_clips(search, without)
         clips = together(clips, more)
-    say("testing what is left")
+    notify("testing what is left")
     found, checks, named = ended(search, without, tailed)
     fewer = eliminate(found, [*in_noise, *shock, *named])
     if fewer is not found:
@@ -102,10 +104,10 @@ def run_procedure(
     explained, failing = within_tolerance(search, checks, in_noise)
     beside = len(in_noise) + len(search.causes) > 1
     in_noise = [x for x in in_noise if x.log_p <= SETTINGS.limit(x.effect, beside)]
-    say("looking for what cannot be distinguished")
+    notify("looking for what cannot be distinguished")
     classes = {cause.effect: rivals(search, cause) for cause in search.causes}
     return ProcedureResult(
-        search, base, scores, together(structural, clips), in_noise, checks, explained,
+        search, base, scores, together(reading_faults, clips), in_noise, checks, explained,
         failing, raw, whole, classes,
     )  # fmt: skip
 
@@ -121,11 +123,11 @@ def ended(search: Search, without, tailed) -> tuple[Search, list[Check], list[No
 def prepared(recording: Recording, without):
     """(readings as recorded, causes in them, readings put right, whether they could be)."""
     raw = arrange(recording)
-    structural, readings, mended = find_structural(raw, without)
+    reading_faults, readings, corrected = find_reading_faults(raw, without)
     used = determined(readings)
     if not used.all():
         raw, readings = raw.select(used), readings.select(used)
-    return raw, structural, readings, mended
+    return raw, reading_faults, readings, corrected
 
 
 def with_outliers(search: Search) -> Search:
@@ -150,9 +152,10 @@ def unshaken(search: Search, without) -> tuple[list, np.ndarray]:
 
 def without_shocks(search: Search, used) -> tuple[Search, Fit]:
     """The search gone on with in the samples ``used`` (T,) bool, and the base model's fit there."""
-    search.say(f"going on without shocks, in {used.sum()} of {used.size} samples")
+    search.notify(f"going on without shocks, in {used.sum()} of {used.size} samples")
     readings = replace(search.readings, keep=search.allowed).select(used)
-    fresh = Search(readings.with_sd(readings.declared), search.columns, search.effects, search.say)
+    readings = readings.with_sd(readings.declared)
+    fresh = Search(readings, search.columns, search.effects, search.notify)
     fresh = fresh.fitted()
     former = {name: getattr(search.fit.state, name) for name in ("positions", "parameters")}
     found = replace(fresh, causes=search.causes, trace=search.trace)

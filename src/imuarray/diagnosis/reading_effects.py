@@ -22,7 +22,7 @@ TURNS = [
 ]  # fmt: skip
 
 
-class Structural(NamedTuple):
+class ReadingFault(NamedTuple):
     """One such effect: whose, log p, its numbers and the words for what was read."""
 
     effect: str
@@ -61,7 +61,7 @@ def find_repeats(readings: Readings):
     numbers = {"share": (float(np.mean(shares)), float(np.std(shares)), "1")}
     says = f"{100 * np.mean(shares):.2g} % of the readings repeat the one before exactly"
     # a coarse converter at rest repeats itself, too, and is right
-    found = Structural(
+    found = ReadingFault(
         "stale_samples", tuple(sorted({*hit})), float(min(logs)), numbers, says, doubtful=True
     )
     return [found], lost
@@ -107,7 +107,7 @@ def _tied(readings: Readings, kind: int) -> float:
     return (1 + some.size - np.unique(some).size) / max(some.size, 1)
 
 
-def rails_cause(found, log_p: float, says: str) -> Structural:
+def rails_cause(found, log_p: float, says: str) -> ReadingFault:
     """The cause of triads (imu, kind, rail in SI) whose readings a rail clips."""
     numbers = {}
     for kind, name in enumerate(KINDS):
@@ -116,7 +116,7 @@ def rails_cause(found, log_p: float, says: str) -> Structural:
             numbers[f"{name}_rail"] = float(np.median(sizes)), float(np.std(sizes)), UNITS[kind]
     where = ", ".join(f"{n} {v[0]:.4g} {v[2]}" for n, v in numbers.items())
     imus = tuple(sorted({imu for imu, *_ in found}))
-    return Structural(RAILS, imus, log_p, numbers, f"{says} ({where})")
+    return ReadingFault(RAILS, imus, log_p, numbers, f"{says} ({where})")
 
 
 def _piles(size, at) -> bool:
@@ -137,7 +137,7 @@ def find_swaps(readings: Readings):
     unknown and nothing is mended.
     """
     count = len(readings.exists)
-    turns, hit, mended = np.tile(np.eye(3), (count, 2, 1, 1)), [], True
+    turns, hit, corrected = np.tile(np.eye(3), (count, 2, 1, 1)), [], True
     lever = np.zeros((len(readings.time), count, 3))
     for kind in (1, 0):
         there = np.flatnonzero(readings.exists[:, kind])
@@ -146,7 +146,7 @@ def find_swaps(readings: Readings):
         best = max(there, key=lambda j: sum(map(_is_straight, against[j].values())))
         agreeing = [k for k in there if _is_straight(against[best][k])]
         if 2 * len(agreeing) <= len(there) and len(there) > 2:
-            mended = False
+            corrected = False
             hit += [(int(k), kind) for k in there]
             continue
         common = np.median(values[:, agreeing] - lever[:, agreeing], axis=1)
@@ -164,11 +164,11 @@ def find_swaps(readings: Readings):
     says = "; ".join(
         f"{KINDS[kind]} {readings.labels[imu]}: {_axes(turns[imu, kind])}" for imu, kind in hit
     )
-    if not mended:
+    if not corrected:
         turns[:] = np.eye(3)
         says = "no majority of the triads agrees on the axes: put them right first"
     imus = tuple(sorted({imu for imu, _ in hit}))
-    return [Structural(SWAP, imus, -1e6, {}, says)], turns, mended
+    return [ReadingFault(SWAP, imus, -1e6, {}, says)], turns, corrected
 
 
 def _matrix(reference, values) -> np.ndarray:
@@ -206,9 +206,9 @@ def _axes(turn) -> str:
 SWAP = "axis_swap"
 
 
-def find_structural(readings: Readings, without=()):
+def find_reading_faults(readings: Readings, without=()):
     """(causes, readings put right, whether they could be): axes turned back, the rest left out."""
-    causes, mended = [], True
+    causes, corrected = [], True
     for name, find in (("stale_samples", find_repeats), (RAILS, find_rails)):
         if name not in without:
             found, lost = find(readings)
@@ -216,7 +216,7 @@ def find_structural(readings: Readings, without=()):
             readings = readings.without(lost)
     if SWAP not in without:
         # each triad against each: a part tells
-        found, turns, mended = find_swaps(part_of(readings, SETTINGS.searched))
+        found, turns, corrected = find_swaps(part_of(readings, SETTINGS.searched))
         causes += found
         if found:
             values = readings.values.copy()
@@ -224,4 +224,4 @@ def find_structural(readings: Readings, without=()):
                 block = np.s_[:, imu, 3 * kind : 3 * kind + 3]
                 values[block] = readings.values[block] @ turns[imu, kind]
             readings = replace(readings, values=values)
-    return causes, readings, mended
+    return causes, readings, corrected

@@ -63,7 +63,7 @@ class Replicator:
         return left - fit.less_motion(moved)
 
 
-class Seen:
+class Observed:
     """Parts that the test quantities of one fit have in common, whatever the residual."""
 
     def __init__(self, fit: Fit):
@@ -89,7 +89,7 @@ class Seen:
 class Part(NamedTuple):
     """A kind's residuals: ``values`` and their squares (T, n, 3), zero where left out."""
 
-    seen: Seen
+    observed: Observed
     there: np.ndarray  # (6 N,) bool, which readings
     values: np.ndarray
     square: np.ndarray
@@ -100,7 +100,7 @@ class Part(NamedTuple):
 
     def mean(self, values) -> np.ndarray:
         """Mean by triad of values that are zero where readings are left out."""
-        return values.sum(axis=(0, 2)) / self.kept(self.seen.keep).sum(axis=(0, 2))
+        return values.sum(axis=(0, 2)) / self.kept(self.observed.keep).sum(axis=(0, 2))
 
 
 def picked(values, there) -> np.ndarray:
@@ -108,15 +108,15 @@ def picked(values, there) -> np.ndarray:
     return values.reshape(len(values), -1)[:, there].reshape(len(values), -1, 3)
 
 
-def quantities(unit, seen: Seen) -> dict[tuple[int, str], np.ndarray]:
+def quantities(unit, observed: Observed) -> dict[tuple[int, str], np.ndarray]:
     """Values by sensor of each kind's `TESTS` of a residual (T, N, 6), NaN where left out."""
     filled, found = np.nan_to_num(unit), {}
-    for kind, labels in enumerate(seen.labels):
+    for kind, labels in enumerate(observed.labels):
         if not labels:
             continue
-        there = (seen.known & (np.arange(6) // 3 == kind)).ravel()
+        there = (observed.known & (np.arange(6) // 3 == kind)).ravel()
         values = picked(filled, there)
-        part = Part(seen, there, values, values**2)
+        part = Part(observed, there, values, values**2)
         every = {(kind, check): test.function(part) for check, test in TESTS.items()}
         found |= {key: values for key, values in every.items() if values is not None}
     return found
@@ -135,12 +135,12 @@ def _growth(size):
     """rms in the highest quarter of a size of the motion over that in the lowest half, by triad."""
 
     def ratio(part):
-        chosen = part.seen.sizes.get(size)
+        chosen = part.observed.sizes.get(size)
         if chosen is None:
             return None
         above, below = (
             (chosen @ values.reshape(len(values), -1)).reshape(2, -1, 3).sum(axis=2)
-            for values in (part.square, part.kept(part.seen.keep))
+            for values in (part.square, part.kept(part.observed.keep))
         )
         return np.sqrt(above[0] / below[0] / (above[1] / below[1]))
 
@@ -148,24 +148,24 @@ def _growth(size):
 
 
 def _rms(part):
-    return np.sqrt(part.square.sum(axis=0) / part.kept(part.seen.keep).sum(axis=0)).ravel()
+    return np.sqrt(part.square.sum(axis=0) / part.kept(part.observed.keep).sum(axis=0)).ravel()
 
 
 def _along(part):
-    along = np.einsum("tki,ti->tk", part.values, part.seen.way)
+    along = np.einsum("tki,ti->tk", part.values, part.observed.way)
     return np.sum(along**2, axis=0) / np.maximum(np.sum(part.square, axis=(0, 2)), 1e-300)
 
 
 def _lag_one(part):
-    pairs = part.kept(part.seen.pairs)
+    pairs = part.kept(part.observed.pairs)
     products = np.sum(pairs * part.values[1:] * part.values[:-1], axis=(0, 2))
     return products / pairs.sum(axis=(0, 2)) / part.mean(part.square)
 
 
 def _drift(part):
-    x = part.seen.time
+    x = part.observed.time
     slope = x @ part.values.reshape(len(x), -1) / np.sum(x**2)
-    return slope * part.seen.length
+    return slope * part.observed.length
 
 
 def _between(part):
@@ -210,20 +210,20 @@ TESTS = {
 
 def discrepancies(fit: Fit, rng, replicates: int) -> list[Discrepancy]:
     """Every test quantity of a fit beside its band over replicates, most striking first."""
-    replicator, seen = Replicator(fit), Seen(fit)
+    replicator, observed = Replicator(fit), Observed(fit)
     share = fit.readings.keep / np.sqrt(np.maximum(1.0 - fit.leverage, 1e-6))
-    measured = quantities(standardised(fit), seen)
-    drawn = [quantities(replicator.draw(rng) * share, seen) for _ in range(replicates)]
+    measured = quantities(standardised(fit), observed)
+    drawn = [quantities(replicator.draw(rng) * share, observed) for _ in range(replicates)]
     found = [
-        _compare(seen, *key, values, np.array([each[key] for each in drawn]))
+        _compare(observed, *key, values, np.array([each[key] for each in drawn]))
         for key, values in measured.items()
     ]
     return [item for _, item in sorted(found, key=lambda pair: pair[0], reverse=True)]
 
 
-def _compare(seen: Seen, kind: int, check: str, values, drawn):
+def _compare(observed: Observed, kind: int, check: str, values, drawn):
     """(how far out, Discrepancy) of the worst sensor, against the worst of each replicate."""
-    test, labels, name = TESTS[check], seen.labels[kind], KINDS[kind]
+    test, labels, name = TESTS[check], observed.labels[kind], KINDS[kind]
     places = [f"{k}{axis}" for k in labels for axis in "xyz"] if test.by_axis else labels
     centre, spread = drawn.mean(axis=0), np.maximum(drawn.std(axis=0), 1e-12)
     away = np.abs(values - centre) / spread

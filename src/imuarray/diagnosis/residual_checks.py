@@ -16,7 +16,7 @@ from imuarray.diagnosis.replicates import motion_sizes
 from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.linearise import CHUNK
-from imuarray.engine.normal import seen_through
+from imuarray.engine.normal import projected_columns
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.linear import scaled_square
 from imuarray.motion.state import lever
@@ -78,7 +78,7 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
     """Each group of features over all axes, and each IMU's axes over all features."""
     inner = given.covariance(given.places(fit.active))
     chosen = fit.active[:, fit.wanted]
-    pairs, through = np.argwhere(chosen), seen_through(fit.whitened, fit.basis, chosen)[0]
+    pairs, projected = np.argwhere(chosen), projected_columns(fit.whitened, fit.basis, chosen)[0]
     motion, (samples, count) = fit.state.motion, fit.residual.shape[:2]
     basis = fit.basis.reshape(samples, count, 6, -1)
     groups: dict[str, list] = {}
@@ -95,7 +95,7 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
                     table[f"lever times {cause}"] = displaced(motion, common[cause], axis)
             names = np.repeat(list(table), [v.shape[1] for v in table.values()])
             stacked = np.hstack(list(table.values()))
-            seen = -np.einsum("ti,tia->ta", basis[:, imu, axis], through)
+            seen = -np.einsum("ti,tia->ta", basis[:, imu, axis], projected)
             own = np.flatnonzero(pairs[:, 0] == imu)
             seen[:, own] += fit.whitened[:, imu, axis][:, pairs[own, 1]]
             kept = fit.readings.keep[:, imu, axis].astype(float)
@@ -103,14 +103,14 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
             score = stacked.T @ fit.residual[:, imu, axis]
             cross = stacked.T @ seen
             block = stacked.T @ (free[:, None] * stacked) - cross @ inner @ cross.T
-            bare = np.diag(stacked.T @ (kept[:, None] * stacked))
+            plain = np.diag(stacked.T @ (kept[:, None] * stacked))
             # slow regressors see coloured noise larger than its sd, at most by this
             rho = max(noise.correlation[imu, axis // 3], 0.0)
             block = block * ((1 + rho) / (1 - rho))
             for name in table:
                 chosen = np.flatnonzero(names == name)
-                groups.setdefault(name, []).append((imu, *_chi(block, score, bare, chosen)))
-            axes.append((imu, *_chi(block, score, bare, np.arange(len(names)))))
+                groups.setdefault(name, []).append((imu, *_chi(block, score, plain, chosen)))
+            axes.append((imu, *_chi(block, score, plain, np.arange(len(names)))))
     alike = dependence(fit)
     checks = [_either(f"residual against {name}", found, alike) for name, found in groups.items()]
     every = _pooled("residual against all", axes, alike)
@@ -138,9 +138,9 @@ def dependence(fit: Fit) -> float:
     return max(SETTINGS.crowd, float(np.sum(together**2)) / len(there))
 
 
-def _chi(block, score, bare, chosen):
+def _chi(block, score, plain, chosen):
     """(chi-square, degrees of freedom) of some features."""
-    scale = np.sqrt(np.maximum(bare[chosen], 1e-300))
+    scale = np.sqrt(np.maximum(plain[chosen], 1e-300))
     inner = block[np.ix_(chosen, chosen)]
     return scaled_square(inner, score[chosen], SETTINGS.seen_feature, scale)
 

@@ -74,11 +74,11 @@ def refine_instant(fit: Fit, imus, around: float) -> float:
     columns, state = fit.columns, fit.state
     chosen = columns.of(POSITION)
     shifts = columns.model.split(state.parameters)[SHIFT][list(imus), :3]
-    blocks, motion = fit.whitened[:, imus][..., chosen], fit.through(chosen)[:, imus]
+    blocks, motion = fit.whitened[:, imus][..., chosen], fit.projected(chosen)[:, imus]
     along = np.einsum("tnic,nc->tni", blocks, shifts)
-    through = np.einsum("tndc,nc->td", motion, shifts)
+    projected = np.einsum("tndc,nc->td", motion, shifts)
     linear = np.einsum("tni,tni->t", along, fit.residual[:, imus])
-    square = np.sum(along**2, axis=(1, 2)) - np.sum(through**2, axis=1)
+    square = np.sum(along**2, axis=(1, 2)) - np.sum(projected**2, axis=1)
     after = fit.readings.time >= around
     # switching the step off where it is on costs s + i / 2, on where it is off -s + i / 2
     change = np.where(after, linear + square / 2, -(linear - square / 2))

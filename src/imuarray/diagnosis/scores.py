@@ -154,12 +154,12 @@ class Information:
 
     def test(self, conditional: Conditional, chosen):
         """(chi-square, degrees of freedom) of the parameters at ``chosen`` places."""
-        seen = self.seen(conditional, chosen)
+        observed = self.observed(conditional, chosen)
         mine = np.searchsorted(conditional.of, chosen)
-        along = seen.vectors.T @ (conditional.score[mine] / seen.scale)
-        return float(along @ seen.precision @ along), len(seen.values)
+        along = observed.vectors.T @ (conditional.score[mine] / observed.scale)
+        return float(along @ observed.precision @ along), len(observed.values)
 
-    def seen(self, conditional: Conditional, chosen) -> ObservedDirections:
+    def observed(self, conditional: Conditional, chosen) -> ObservedDirections:
         """The directions that are seen of the parameters at ``chosen`` places."""
         information, _, meat, of = conditional
         mine = np.searchsorted(of, chosen)
@@ -167,8 +167,8 @@ class Information:
         values, vectors, scale = scaled_eigh(block, self.scale[chosen])
         # a parameter stays within its prior: near a gauge, data alone would take it anywhere
         ridge = vectors.T @ ((self.usual[chosen] / scale**2)[:, None] * vectors)
-        seen = values > np.maximum(SETTINGS.seen, np.diag(ridge))
-        values, vectors, ridge = values[seen], vectors[:, seen], ridge[np.ix_(seen, seen)]
+        kept = values > np.maximum(SETTINGS.observed, np.diag(ridge))
+        values, vectors, ridge = values[kept], vectors[:, kept], ridge[np.ix_(kept, kept)]
         if meat is information:
             spread = np.diag(values)
         else:
@@ -238,13 +238,14 @@ def detectable(search) -> dict[str, dict]:
         if len(candidate.imus) > 1 or not len(chosen):
             continue
         beside = np.setdiff1d(active, chosen)
-        seen = given.seen(given.conditional(beside, of=chosen), chosen)
+        observed = given.observed(given.conditional(beside, of=chosen), chosen)
         tests = sum(each.effect == candidate.effect and not each.whole for each in every)
-        least = max(noncentrality(search, candidate.effect, tests, len(seen.values)), search.least)
-        slope = (seen.vectors * seen.values) @ np.linalg.cholesky(seen.precision)
+        count = len(observed.values)
+        least = max(noncentrality(search, candidate.effect, tests, count), search.least)
+        slope = (observed.vectors * observed.values) @ np.linalg.cholesky(observed.precision)
         shown = np.sum(slope**2, axis=1)
         clear = 2 * (search.least_z + POWER) * scatter(given, scores, beside, chosen)
-        sizes = np.sqrt(np.maximum(least, clear**2) / np.maximum(shown, 1e-30)) / seen.scale
+        sizes = np.sqrt(np.maximum(least, clear**2) / np.maximum(shown, 1e-30)) / observed.scale
         label = search.readings.labels[candidate.imus[0]]
         entry = found.setdefault(candidate.effect, {"units": {}, "sizes": {}})
         own = entry["sizes"].setdefault(label, {})
@@ -252,7 +253,7 @@ def detectable(search) -> dict[str, dict]:
         for number, size, share in zip(chosen, sizes, shown, strict=True):
             place = columns.places[column_at[int(number)]]
             name = component(candidate.effect, place)
-            if share > SETTINGS.seen:  # of the parameter's own information
+            if share > SETTINGS.observed:  # of the parameter's own information
                 own[name] = min(float(size), own.get(name, np.inf))
                 entry["units"][name] = unit_of(candidate.effect, place)
     return {effect: entry for effect, entry in found.items() if entry["units"]}

@@ -35,7 +35,7 @@ class Settings:
     same: float = 1e-9  # relative difference of equal readings
     least_log: float = -700.0  # of a tail that a double holds
     # Score tests and adoption (`scores`, `adoption`, `state`, `special`)
-    seen: float = 1e-5  # of a parameter's own information must survive the projection to count
+    observed: float = 1e-5  # of a parameter's own information must survive the projection to count
     visible: float = 1e-3  # the same of a combination that is no gauge of motion and positions
     patience: int = 16  # refusals in a row: what is left is none of the catalogue
     of_one: int = 4  # of them, of one effect: rough motion makes it significant in all IMUs

@@ -83,16 +83,16 @@ def placebo_of_ages(search) -> tuple[float, float]:
     What they have in common the motion takes up; 0 for a single clock, which has no other to go to.
     """
     fit, column = search.fit, search.columns.of(DELAY)[0]
-    along, through = fit.whitened[..., column], fit.through([column])[..., 0]
+    along, projected = fit.whitened[..., column], fit.projected([column])[..., 0]
     score, _ = delay_score(fit)
     clocks = search.columns.model.split(np.asarray(fit.state.parameters))[CLOCK]
     readings = search.readings
     delay = -age_of(clocks.T, clock_turns(clocks.T, readings.time[:, None], readings.span))
 
     def informed(values):
-        common = np.einsum("tkd,tk->td", through, values)
+        common = np.einsum("tkd,tk->td", projected, values)
         own = np.sum(along**2, axis=2) * values
-        return own - np.einsum("tkd,td->tk", through, common)
+        return own - np.einsum("tkd,td->tk", projected, common)
 
     imus = list(search.clocks)
     own, moved = np.zeros_like(delay), np.zeros_like(delay)

@@ -22,7 +22,7 @@ from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS as CLOCKS
-from imuarray.engine.widths import mask_of_left, spread_of
+from imuarray.engine.widths import residual_map_mask, spread_of
 from imuarray.tails import log_chi_square
 
 
@@ -54,11 +54,13 @@ class ScoreAtFit:
         made, plain = self.fit, information_at(self.fit)
         meat = noises.coloured_meat(made, plain.information, self.correlation)
         # fitted ones, too: put back to zero they are what the others are; refitted, nothing is left
-        mask = mask_of_left([made.readings.left], made.columns, False) & made.described
+        mask = residual_map_mask([made.readings.left], made.columns, False) & made.described
         if mask.any():
-            seen = plain.information[:, plain.places(mask)]
+            linearised = plain.information[:, plain.places(mask)]
             spread = spread_of(made.readings.left, made.columns, mask)
-            meat = (plain.information if meat is None else meat) + seen @ spread @ seen.T
+            meat = (
+                plain.information if meat is None else meat
+            ) + linearised @ spread @ linearised.T
         return plain if meat is None else replace(plain, meat=meat, correlation=self.correlation)
 
 
@@ -69,7 +71,7 @@ class Search:
     readings: Readings  # those in use, with the noise sds in use
     columns: Columns  # of all parameters that are described
     effects: tuple[str, ...]  # ids that may be adopted
-    say: Callable[[str], None]  # is told of every step
+    notify: Callable[[str], None]  # is told of every step
     smooth: bool = True  # whether the motion's derivatives may be had from neighbouring samples
     causes: tuple[Cause, ...] = ()  # what is adopted, in order
     fit: Fit | None = None  # of what is adopted
@@ -143,13 +145,13 @@ class Search:
         search, turns = self, turns + bool(self.clocks)
         for turn in range(turns + 2):
             search = search._without_jumps(state, turn)
-            state, converged, seen = search_optimum(
+            state, converged, linearised = search_optimum(
                 search.readings, search.columns, search.active, state, search.smooth, rough
             )
             readings = search.readings
-            judged = noises.estimated(readings, seen.residual, seen.basis)
-            del seen  # large
-            change = np.max(np.abs(judged.sd / readings.sd - 1)[readings.exists])
+            found = noises.estimated(readings, linearised.residual, linearised.basis)
+            del linearised  # large
+            change = np.max(np.abs(found.sd / readings.sd - 1)[readings.exists])
             enough = turn > 0 or not search.clocks
             limit = SETTINGS.steady_noise
             # the noise beside a model that is far off would never be steady
@@ -157,7 +159,7 @@ class Search:
             if (change < limit and enough) or (turn + 1 >= turns and near):
                 break
             state = estimated_again(search._with_jumps, search.columns, state, search.clocks)
-            search = replace(search, readings=readings.with_sd(judged.sd))
+            search = replace(search, readings=readings.with_sd(found.sd))
         made = at(search.readings, search.columns, search.active, state)
         noise = noises.estimated(made.readings, made.residual, made.basis)
         search = search.ending(made, noise)
@@ -305,7 +307,7 @@ def eliminate(search: Search, others=()) -> Search:
         beside = len(search.causes) + len(others) > 1
         limit = SETTINGS.limit(cause.effect, beside) - beside * cause.tries
         if small or not needed(search, cause.effect, limit):
-            search.say(f"dropped {cause.effect}: not needed beside the others")
+            search.notify(f"dropped {cause.effect}: not needed beside the others")
             rest = tuple(other for other in search.causes if other.effect != cause.effect)
             search = replace(search, causes=rest)
             search = search.refit(search.started())

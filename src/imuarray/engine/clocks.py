@@ -24,14 +24,16 @@ PHASES = np.arange(32) / 32  # of a turn, tried at first
 
 def delay_of(readings: Readings, columns: Columns, state: State) -> tuple[np.ndarray, np.ndarray]:
     """Each sample's score and information of each IMU's delay at a state, (T, N) each."""
-    seen = linearise(readings, columns, state, columns.of(DELAY)[:1])
-    return delay_parts(seen.residual, seen.whitened[..., 0], seen.through[..., 0])
+    linearised = linearise(readings, columns, state, columns.of(DELAY)[:1])
+    return delay_parts(
+        linearised.residual, linearised.whitened[..., 0], linearised.projected[..., 0]
+    )
 
 
-def delay_parts(residual, along, through) -> tuple[np.ndarray, np.ndarray]:
+def delay_parts(residual, along, projected) -> tuple[np.ndarray, np.ndarray]:
     """Parts from the residual and the derivative by the delay, whitened and projected."""
     score = np.einsum("tki,tki->tk", along, residual)
-    information = np.sum(along**2, axis=2) - np.sum(through**2, axis=2)
+    information = np.sum(along**2, axis=2) - np.sum(projected**2, axis=2)
     return score, np.maximum(information, 1e-300)
 
 

@@ -22,15 +22,16 @@ def course(found: Estimate, moving) -> tuple[dict, dict]:
     over the declared noise around the instants ``stretch`` s; ``shaken`` (time), 1 where several
     IMUs are far off at once.
     """
-    readings, seen = found.recorded[0].readings, found.passes[0]
+    readings, one_pass = found.recorded[0].readings, found.passes[0]
     time = readings.time + readings.origin
-    far = distances(readings, seen)
+    far = distances(readings, one_pass)
     blocks = blocks_of(
         len(time), int(np.clip(len(time) // SETTINGS.course_samples, 1, SETTINGS.course_stretches))
     )
     squares = far * (readings.sd / readings.declared) ** 2
     rms = np.sqrt([
-        squares[part].sum(axis=0) / np.maximum(seen.number[part].sum(axis=0), 1) for part in blocks
+        squares[part].sum(axis=0) / np.maximum(one_pass.number[part].sum(axis=0), 1)
+        for part in blocks
     ])  # fmt: skip
     counts = readings.array.accelerometers, readings.array.gyroscopes
     variables: dict[str, tuple] = {
@@ -89,7 +90,7 @@ def changes(found: Estimate) -> tuple[tuple[float, float], tuple[int, float]]:
 def _changing(found: Estimate, places) -> tuple[np.ndarray, np.ndarray]:
     """(score (k,), information (k, k)) of a change of the parameters at ``places``."""
     share, along, whole = np.zeros(len(places)), 0.0, 0.0
-    counts = [len(seen.score) for seen in found.passes]
+    counts = [len(one_pass.score) for one_pass in found.passes]
     middle = np.concatenate([(np.arange(count) + 0.5) / count - 0.5 for count in counts])
     for when, (inner, slope) in zip(middle, found.blocks, strict=True):
         share += when * slope[places]
@@ -104,8 +105,8 @@ def block_scores(found: Estimate) -> Scores:
     Noise, degrees of freedom and clocks' phases are those of all blocks.
     """
     (one,) = found.recorded
-    seen = linearise(one.readings, found.columns, one.state, [])
+    made = linearise(one.readings, found.columns, one.state, [])
     nats = log_densities(
-        one.readings, one.state, seen.residual, seen.misfit, seen.log_volume, found.freedoms
+        one.readings, one.state, made.residual, made.misfit, made.log_volume, found.freedoms
     )
     return scores_of(nats, found.blocks, found.precision)

@@ -204,15 +204,15 @@ def _by_triad(place, values, count) -> np.ndarray:
 def diagnosed(diagnosis) -> xr.Dataset:
     """The extended model that `imuarray.diagnose` came to, as `imuarray.calibrate` would give it.
 
-    Attribute ``mended``: effects whose readings were put right in memory, or left out.
+    Attribute ``corrected_readings``: effects whose readings were put right in memory, or left out.
     """
     recording, document = diagnosis.recording, diagnosis.document
     found = with_readings(engine_dataset([recording], diagnosis.extended.robust), [recording])
     named = [cause["effect"] for cause in document["causes"] if cause["effect"] in DATA_EFFECTS]
-    mended = [name for name in named if DATA_EFFECTS[name].kind == "readings"]
+    corrected = [name for name in named if DATA_EFFECTS[name].kind == "readings"]
     data = recording.specific_force, recording.angular_rate
     return found.assign_attrs(
-        model="diagnosis", mended=" ".join(mended),
+        model="diagnosis", corrected_readings=" ".join(corrected),
         reasons=json.dumps(document.get("reasons", [])),
         **stamp({"recording": digest(*data)}, document["seed"]),
     )  # fmt: skip

@@ -97,10 +97,10 @@ class Estimate:
     def residual_ratio(self) -> float:
         """Rms residual over the declared noise, degrees of freedom allowed for."""
         squares, number = 0.0, 0.0
-        for one, seen in zip(self.recorded, self.passes, strict=True):
+        for one, one_pass in zip(self.recorded, self.passes, strict=True):
             scale = (one.readings.sd / one.readings.declared) ** 2
-            squares += np.sum(distances(one.readings, seen) * scale)
-            number += seen.number.sum()
+            squares += np.sum(distances(one.readings, one_pass) * scale)
+            number += one_pass.number.sum()
         return float(np.sqrt(squares / number))
 
     def smooth_ratio(self) -> np.ndarray | None:
@@ -110,7 +110,7 @@ class Estimate:
         least jerk: what is faster than the samples is in the rest. None where motion is smooth.
         """
         parts = []
-        for one, seen in zip(self.recorded, self.passes, strict=True):
+        for one, one_pass in zip(self.recorded, self.passes, strict=True):
             if one.state.rough_prior is None:
                 return None
             jerk = np.linalg.norm(one.state.jerk[1], axis=1)
@@ -118,7 +118,7 @@ class Estimate:
             turn = np.linalg.norm(one.state.motion[:, 3:6], axis=1)
             turning = turn > np.median(turn)
             smooth = turning & (jerk <= np.quantile(jerk[turning], SETTINGS.smooth_share))
-            far = distances(one.readings, seen) / median_of(seen.number)
+            far = distances(one.readings, one_pass) / median_of(one_pass.number)
             parts.append(far[smooth] * scale)
         return np.sqrt(np.median(np.concatenate(parts), axis=0))
 
@@ -225,13 +225,13 @@ def places_of(columns: Columns, active, recordings: int) -> tuple[np.ndarray, ..
 
 def _passed(recorded, columns, active, improved: int = 1):
     """Each recording linearised, its motion improved."""
-    seen, moved = [], []
+    one_pass, moved = [], []
     for one in recorded:
         state = with_derivatives(one.readings, one.state, one.smooth)
-        seen.append(normal_pass(one.readings, columns, state, active, improved))
-        state = state._replace(motion=seen[-1].motion)
-        moved.append(_sized(replace(one, state=state), seen[-1].rough))
-    return tuple(moved), tuple(seen)
+        one_pass.append(normal_pass(one.readings, columns, state, active, improved))
+        state = state._replace(motion=one_pass[-1].motion)
+        moved.append(_sized(replace(one, state=state), one_pass[-1].rough))
+    return tuple(moved), tuple(one_pass)
 
 
 def _sized(one: Recorded, rough) -> Recorded:
@@ -241,8 +241,8 @@ def _sized(one: Recorded, rough) -> Recorded:
     """
     if one.state.rough_prior is None:
         return one
-    told = (rough[1] > SETTINGS.told * len(one.state.motion)) & (rough[0] > 0)
-    step = np.log(np.where(told, rough[0], 1.0) / np.where(told, rough[1], 1.0)) / 2
+    determined = (rough[1] > SETTINGS.determined * len(one.state.motion)) & (rough[0] > 0)
+    step = np.log(np.where(determined, rough[0], 1.0) / np.where(determined, rough[1], 1.0)) / 2
     made = (*one.resized, step)[-3:]
     if len(made) == 3:
         farther = to_come(*made)
@@ -271,8 +271,8 @@ def _size(places) -> int:
 def _summed(passes, places):
     """(information (n, n), score (n,), [(information, score)] of all blocks)."""
     size, blocks = _size(places), []
-    for seen, place in zip(passes, places, strict=True):
-        for inner, slope in zip(seen.information, seen.score, strict=True):
+    for one_pass, place in zip(passes, places, strict=True):
+        for inner, slope in zip(one_pass.information, one_pass.score, strict=True):
             whole, score = np.zeros((size, size)), np.zeros(size)
             whole[np.ix_(place, place)], score[place] = inner, slope
             blocks.append((whole, score))
@@ -342,8 +342,8 @@ def _judged(recorded, passes, columns, active, nu) -> tuple[Recorded, ...]:
         kinds = EFFECTS[name].kinds if name in EFFECTS else [0]  # positions
         paid[:, kinds] += active[:, [column]] / len(kinds)
     return tuple(
-        replace(one, readings=reweighted(one.readings, seen, paid / len(recorded), nu))
-        for one, seen in zip(recorded, passes, strict=True)
+        replace(one, readings=reweighted(one.readings, one_pass, paid / len(recorded), nu))
+        for one, one_pass in zip(recorded, passes, strict=True)
     )
 
 

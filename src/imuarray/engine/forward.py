@@ -61,7 +61,7 @@ def with_effects(readings: Sequence[Readings], effects) -> Estimate:
         )
     active = columns.mask([POSITION, *effects])
     recorded = [Recorded.of(one, columns) for one in readings]
-    return widths.settled(estimate(recorded, columns, active))
+    return widths.widened(estimate(recorded, columns, active))
 
 
 def resumed(readings: Readings, columns: Columns, active, state: State) -> Estimate:
@@ -85,7 +85,7 @@ def resumed(readings: Readings, columns: Columns, active, state: State) -> Estim
     imus = np.flatnonzero(active[:, columns.of(CLOCK)].any(axis=1))
     if imus.size:
         recorded = timed(recorded, recorded.readings.keep, columns, imus)
-    return widths.settled(estimate([recorded], columns, active))
+    return widths.widened(estimate([recorded], columns, active))
 
 
 def _slow(one: Recorded) -> bool:
@@ -109,7 +109,7 @@ def _needs_neighbours(group: str) -> bool:
 
 
 def select_forward(
-    readings: Sequence[Readings], bare: bool = True
+    readings: Sequence[Readings], plain: bool = True
 ) -> tuple[Estimate, list[EffectGroup]]:
     """The sensor model of a board from its recordings, group by group.
 
@@ -117,11 +117,11 @@ def select_forward(
     fitted, then the others are tested again. At last each must still gain beside all others, but
     for clocks, whose jumps a fit does not move, and for what the estimate of another calls for
     (`Selected.needed`). Where motion is smooth and no sensor late, the rate's own change is then a
-    prior of omega_dot. ``bare``: whether the last fit is wanted where no group is kept; else it is
+    prior of omega_dot. ``plain``: whether the last fit is wanted where no group is kept; else it is
     to be sampled from, by a density that has no such change. InputError or LinAlgError where the
     readings do not determine positions or motion.
     """
-    names = [name for name in groups_of(readings) if bare or name != OWN]
+    names = [name for name in groups_of(readings) if plain or name != OWN]
     columns, begun = _begun(readings, names)
     rough = [name for name in names if name in ROUGH_GROUPS]
     if rough != names and not all(map(_slow, begun)):
@@ -146,14 +146,14 @@ def select_forward(
             break
         now = now.fitted(SETTINGS.rung_again)
     now = now.without([group.name for group in groups if not group.kept])
-    if not (now.kept or bare):
+    if not (now.kept or plain):
         return now.found, clocks + groups
     found = now.fitted().found
-    late = any(map(_needs_neighbours, now.kept)) or (GYROSCOPES in now.kept and not bare)
+    late = any(map(_needs_neighbours, now.kept)) or (GYROSCOPES in now.kept and not plain)
     if all(one.smooth for one in found.recorded) and (readings[0].pair or not late):
         found, curved = _with_slope(found, now.kept, CURVE in names)
         groups = [*groups, *curved.values()]
-    return widths.settled(found), clocks + groups
+    return widths.widened(found), clocks + groups
 
 
 def _with_slope(found: Estimate, kept: dict, curve: bool) -> tuple[Estimate, dict]:
@@ -236,7 +236,7 @@ class Selected(NamedTuple):
         Gyroscope maps at odds with those of first order; beside a lag the shape of filters, however
         uncertain that is: what lags droops.
         """
-        chance, _ = widths.settled(self.found).maps_hold.get("gyroscope", (1.0, []))
+        chance, _ = widths.widened(self.found).maps_hold.get("gyroscope", (1.0, []))
         found = [GYROSCOPES] * (chance < SETTINGS.chance) + [FILTER, BAND] * (LAG in kept)
         return [name for name in found if name in names]
 
@@ -283,7 +283,7 @@ def _left(found: Estimate) -> list[tuple[np.ndarray, np.ndarray]]:
     every, out = [one.readings.left for one in found.recorded], []
     if any(left is None for left in every):
         return out
-    known = widths.mask_of_left(every, found.columns, False)
+    known = widths.residual_map_mask(every, found.columns, False)
     for names in (*zip(widths.SCALES, widths.SKEWS, strict=True), widths.OFFSETS, (widths.DRIFT,)):
         mask = known & found.columns.mask(names)
         if mask.any():
@@ -337,19 +337,19 @@ def gains(found: Estimate, masks: dict, kept: dict, never: str = "") -> list[Eff
 def _tried(name: str, given: Tested, own, beside, left, smooth: bool) -> EffectGroup:
     """A group's gain, and whether it is kept; ``own`` and ``beside`` (N, m) bool."""
     freed, used, ridge = given.chosen(own), given.chosen(beside | own), given.precision.copy()
-    spare, known = np.zeros(len(used), bool), None
+    nuisance, known = np.zeros(len(used), bool), None
     for mask, spread in left:
         mine = given.chosen(mask)
         if not (mine & used).any():
-            spare |= mine
+            nuisance |= mine
             ridge[np.ix_(mine, mine)] = np.linalg.inv(spread)
         elif (mine == freed).all():
             known = spread
-    used |= spare
+    used |= nuisance
     square = np.ix_(used, used)
     parts = [(inner[square], slope[used]) for inner, slope in given.blocks]
     system = parts, (ridge[square], given.means[used]), given.values[used], freed[used]
-    nats, error = summed(each := gains_of(*system, spare[used]))
+    nats, error = summed(each := gains_of(*system, nuisance[used]))
     # what moves much in one block gains most there: the error is large, and less a doubt
     steady = smooth and nats - np.max(each) > SETTINGS.steady_nats
     least = SETTINGS.steady_z if steady else SETTINGS.group_z

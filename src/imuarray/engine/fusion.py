@@ -16,13 +16,12 @@ from imuarray.engine.normal import pick
 from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, by_imu, measured
 from imuarray.engine.settings import SETTINGS
-from imuarray.engine.start import is_smooth, start, with_derivatives
+from imuarray.engine.start import is_smooth, linear_motion, start, with_derivatives
 from imuarray.engine.start import turned as with_slope
-from imuarray.estimation.collapsed import Collapsed, MotionEstimate, motion_at, motion_from
 from imuarray.geometry.array import positions_of, require_planar_extent
 from imuarray.model import ArrayModel
 from imuarray.model.array_model import clock
-from imuarray.motion import Motion
+from imuarray.motion import Motion, MotionEstimate
 
 COMPONENTS = tuple(f"{name}_{axis}" for name in ("omega", "omega_dot", "s") for axis in "xyz")
 
@@ -83,21 +82,15 @@ def fuse(
     if readings.pair:
         return _of_two(readings, model, positions, parameters[split:], covariance)
     require_planar_extent(positions, "positions")
-    data = Collapsed.of(model, specific_force, angular_rate, saturated)
-    rails = one_sided(readings, saturated)
-    first = motion_from(data, positions)
-    state = _state(model, first.motion, positions, parameters[split:])
-    found = Motions(
-        state.motion, np.array(first.converged), np.array(first.iterations), np.array(first.cost)
-    )
-    beyond = turned(first.motion.angular_rate, angular_rate, saturated)
-    other = np.flatnonzero(np.any(beyond != first.motion.angular_rate, axis=1))
-    if model.effects or other.size:
-        every = np.arange(len(readings.time)) if model.effects else other
-        _put(found, every, descend(readings, model, state, every, rails))
+    rails, every = one_sided(readings, saturated), np.arange(len(readings.time))
+    mean, _ = model.noise.angular_rate_given_gyroscopes(np.asarray(angular_rate, float), saturated)
+    state = _state(readings, model, mean, positions, parameters[split:])
+    found = descend(readings, model, state, every, rails)
+    beyond = turned(mean := found.motion[:, :3], angular_rate, saturated)
+    other = np.flatnonzero(np.any(beyond != mean, axis=1))
     if other.size:
-        start = _state(model, motion_at(data, positions, beyond), positions, parameters[split:])
-        again = descend(readings, model, start, other, rails)
+        begin = _state(readings, model, beyond, positions, parameters[split:])
+        again = descend(readings, model, begin, other, rails)
         one = found.cost[other], found.converged[other]
         take = better(one, (again.cost, again.converged))
         _put(found, other[take], Motions(*(part[take] for part in again)))
@@ -142,18 +135,20 @@ def _of_two(readings: Readings, model: ArrayModel, positions, effects, covarianc
     NaN where an axis has no gyroscope off its rail.
     """
     samples = len(readings.time)
-    seen = np.flatnonzero(readings.keep[..., 3:].any(axis=1).all(axis=1))
-    part = readings.select(seen)
+    linearised = np.flatnonzero(readings.keep[..., 3:].any(axis=1).all(axis=1))
+    part = readings.select(linearised)
     part = replace(part, gapless=_followed(part))
     state = start(part, columns_of(model.array, model.effects, np.inf))
     state = state._replace(positions=positions, parameters=np.asarray(effects))
     own, state = _in_turns(part, model, state)
     nowhere = np.full((samples, 9), np.nan)
     found = Motions(nowhere, np.zeros(samples, bool), np.zeros(samples, int), nowhere[:, 0].copy())
-    _put(found, seen, own)
+    _put(found, linearised, own)
     spreads = np.full((2, samples, 9, 9), np.nan)
     # the parameters' share: the prior's mean moves with them
-    spreads[:, seen] = covariances(part, model, with_slope(part, state, follows=True), covariance)
+    spreads[:, linearised] = covariances(
+        part, model, with_slope(part, state, follows=True), covariance
+    )
     return Fused(_estimate(found), *spreads)
 
 
@@ -163,12 +158,15 @@ def _estimate(found: Motions) -> MotionEstimate:
     return MotionEstimate(motion, found.cost, found.steps, found.converged)
 
 
-def _state(model: ArrayModel, motion: Motion, positions, effects) -> State:
-    """Where a search begins; higher derivatives, where effects need them, have a prior."""
-    x = np.hstack([np.asarray(field) for field in motion[: model.motion_size // 3]])
-    prior = None
+def _state(readings: Readings, model: ArrayModel, rate, positions, effects) -> State:
+    """Where a search begins, at ``rate`` (T, 3); higher derivatives that effects need have a prior.
+
+    omega_dot and s are the most likely ones of that rate without effects.
+    """
+    x, prior = np.hstack([rate, linear_motion(readings, positions, rate)]), None
     if model.needs_derivatives:
         mean = np.zeros((len(x), 6))
+        x = np.hstack([x, mean])
         prior = RoughPrior(mean, mean + np.repeat(model.derivative_sd, 3), mean[:, :3])
     nothing = no_derivatives(len(x), len(positions))
     return State(x, positions, np.asarray(effects), nothing, prior)
@@ -260,12 +258,12 @@ def covariances(readings: Readings, model: ArrayModel, state: State, spread):
     directions = np.arange(columns.size)
     for first in range(0, len(noise), CHUNK):
         part = slice(first, first + CHUNK)
-        seen = chunk_at(readings, columns, state, directions, first)
-        turned = np.swapaxes(seen.inverse, 1, 2)
+        linearised = chunk_at(readings, columns, state, directions, first)
+        turned = np.swapaxes(linearised.inverse, 1, 2)
         noise[part] = (turned @ np.swapaxes(turned, 1, 2))[:, :9, :9]
         if spread is not None:
             # the estimate's derivative by the parameters, with its sign turned
-            moved = (turned @ pick(seen.through, active)[1])[:, :9]
+            moved = (turned @ pick(linearised.projected, active)[1])[:, :9]
             shared[part] = moved @ np.asarray(spread)[np.ix_(place, place)] @ moved.mT
         else:
             shared[part] = 0.0

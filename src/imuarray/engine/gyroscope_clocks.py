@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import BSpline
 
-from imuarray.compiled import njit
 from imuarray.engine.linearise import State
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
@@ -43,24 +42,25 @@ def clocks_from_gyroscopes(readings: Readings, acceleration, clocks: dict) -> di
     where that is smooth.
     """
     imus = sorted(clocks)
-    seen = informative(readings, acceleration, imus)
+    gyroscopes = informative(readings, acceleration, imus)
     guess = np.array([clocks[imu] for imu in imus])
     guess[:, 0], guess[:, 3] = UNIT, 0.0
-    maps, weights = np.tile(np.eye(4)[:3], (len(imus), 1, 1)), np.ones(seen.values.shape[:2])
+    maps, weights = np.tile(np.eye(4)[:3], (len(imus), 1, 1)), np.ones(gyroscopes.values.shape[:2])
     for number in range(SETTINGS.rounds):
-        ages = ages_of(guess, seen)
-        motion, left = moved(seen, maps, ages, weights)
+        ages = ages_of(guess, gyroscopes)
+        motion, left = moved(gyroscopes, maps, ages, weights)
         size = 1.4826 * np.median(np.abs(left))
         weights = robust(left, size)
-        maps = remapped(seen, motion, ages, weights)
+        maps = remapped(gyroscopes, motion, ages, weights)
         if number:
-            guess = turned(seen, maps, motion, guess, SETTINGS.reach * SETTINGS.drawn_in**number)
+            reach = SETTINGS.reach * SETTINGS.drawn_in**number
+            guess = turned(gyroscopes, maps, motion, guess, reach)
     # over all samples: those that were picked turn fast by the accelerometers, and less by others
-    seen = informative(readings, acceleration, imus, None)
-    ages = ages_of(guess, seen)
-    motion, left = moved(seen, maps, ages, np.ones(ages.shape))
-    motion = moved(seen, maps, ages, robust(left, size))[0]
-    guess[:, 0] = UNIT * as_much(motion[:, 3:], seen.acceleration)
+    gyroscopes = informative(readings, acceleration, imus, None)
+    ages = ages_of(guess, gyroscopes)
+    motion, left = moved(gyroscopes, maps, ages, np.ones(ages.shape))
+    motion = moved(gyroscopes, maps, ages, robust(left, size))[0]
+    guess[:, 0] = UNIT * as_much(motion[:, 3:], gyroscopes.acceleration)
     if abs(np.log(np.abs(guess[0, 0]) / readings.period)) < SETTINGS.declared_period:
         guess[:, 0] = np.copysign(readings.period, guess[:, 0])
     return dict(zip(imus, guess, strict=True))
@@ -105,19 +105,20 @@ def informative(
     return Gyroscopes(readings.time[good], readings.span, values, acceleration[good])
 
 
-def ages_of(clocks, seen: Gyroscopes) -> np.ndarray:
+def ages_of(clocks, gyroscopes: Gyroscopes) -> np.ndarray:
     """(T, K) s, by clocks (K, 5)."""
-    return clocks[:, 0] * (np.mod(clock_turns(clocks.T, seen.time[:, None], seen.span), 1) - 0.5)
+    turns = clock_turns(clocks.T, gyroscopes.time[:, None], gyroscopes.span)
+    return clocks[:, 0] * (np.mod(turns, 1) - 0.5)
 
 
-def moved(seen: Gyroscopes, maps, ages, weights, stiffness=None):
+def moved(gyroscopes: Gyroscopes, maps, ages, weights, stiffness=None):
     """omega and omega_dot (T, 6) by weighted least squares, and what is left (T, K, 3).
 
     ``stiffness`` (T, 3): omega double dot is free, too, (T, 9); its precision, a reading's being 1.
     """
     samples, number = len(ages), 2 if stiffness is None else 3
     powers = np.stack([np.ones_like(ages), -ages, ages**2 / 2][:number], axis=-1)
-    matrix, target = maps[..., :3], seen.values - maps[..., 3]
+    matrix, target = maps[..., :3], gyroscopes.values - maps[..., 3]
     heavy = weights[..., None] * powers
     both = (heavy[..., None] * powers[..., None, :]).reshape(samples, len(maps), -1)
     square = (np.swapaxes(matrix, 1, 2) @ matrix).reshape(len(maps), 9)
@@ -132,13 +133,13 @@ def moved(seen: Gyroscopes, maps, ages, weights, stiffness=None):
         precision[:, 6:] = stiffness
     every = np.arange(3 * number)
     gram[:, every, every] += precision
-    right[:, 3:6] += ridge * seen.acceleration
+    right[:, 3:6] += ridge * gyroscopes.acceleration
     motion = np.linalg.solve(gram, right[..., None])[..., 0]
     along = np.einsum("tka,tai->tki", powers, motion.reshape(samples, number, 3))
     return motion, target - np.einsum("kij,tkj->tki", matrix, along)
 
 
-def remapped(seen: Gyroscopes, motion, ages, weights) -> np.ndarray:
+def remapped(gyroscopes: Gyroscopes, motion, ages, weights) -> np.ndarray:
     """(K, 3, 4) each gyroscope's own map and bias, their mean that of perfect ones."""
     maps = []
     for k in range(ages.shape[1]):
@@ -147,7 +148,7 @@ def remapped(seen: Gyroscopes, motion, ages, weights) -> np.ndarray:
             rate = rate + ages[:, k, None] ** 2 / 2 * motion[:, 6:]
         full = np.hstack([rate, np.ones((len(rate), 1))])
         heavy = weights[:, k, None] * full
-        maps.append(np.linalg.solve(heavy.T @ full, heavy.T @ seen.values[:, k]).T)
+        maps.append(np.linalg.solve(heavy.T @ full, heavy.T @ gyroscopes.values[:, k]).T)
     maps = np.array(maps)
     common = maps[..., :3].mean(axis=0)
     maps[..., :3] = maps[..., :3] @ np.linalg.inv(common)
@@ -155,39 +156,39 @@ def remapped(seen: Gyroscopes, motion, ages, weights) -> np.ndarray:
     return maps
 
 
-def turned(seen: Gyroscopes, maps, motion, clocks, reach) -> np.ndarray:
+def turned(gyroscopes: Gyroscopes, maps, motion, clocks, reach) -> np.ndarray:
     """The clocks with phase, rate and drift where the gyroscopes' own misfit is least.
 
     All together first, which moves nothing but the jumps (an age common to all is the motion's);
     then each of its own.
     """
-    along, exact = polynomials(seen)
+    along, exact = polynomials(gyroscopes)
     rate, turn = (
         np.einsum("kij,tj->tki", maps[..., :3], motion[:, part]) for part in (slice(3), slice(3, 6))
     )
-    bare = seen.values - maps[..., 3] - rate
-    turns = clock_turns(clocks.T, seen.time[:, None], seen.span)
+    residual = gyroscopes.values - maps[..., 3] - rate
+    turns = clock_turns(clocks.T, gyroscopes.time[:, None], gyroscopes.span)
     most = np.abs(clocks[:, 0]) * np.abs(turn).sum(axis=2)
-    whole = bare, turn, turns, most
+    whole = residual, turn, turns, most
     out, start = clocks.copy(), np.zeros(len(turns))
     together = _searched(*whole, clocks[:, 0], along, start, True, reach)
     taken = along @ together
     turns += taken[:, None]
     for k in range(len(clocks)):
-        own = (np.ascontiguousarray(part[:, [k]]) for part in whole)
+        own = (part[:, [k]] for part in whole)
         place = _searched(*own, clocks[[k], 0], along, taken, False, reach)
         out[k, [2, 1, 4]] += exact @ (place + together)
     return out
 
 
-def polynomials(seen: Gyroscopes) -> tuple[np.ndarray, np.ndarray]:
+def polynomials(gyroscopes: Gyroscopes) -> tuple[np.ndarray, np.ndarray]:
     """(T, 3) of time, orthonormal under the square of omega_dot, and their phase, rate, drift.
 
     So they change where the board turns: a recording may be still for most of its time.
     """
-    since = seen.time - seen.span / 2
-    powers = np.stack([np.ones_like(since), seen.time, since**2 / 2], axis=1)
-    weight = np.linalg.norm(seen.acceleration, axis=1, keepdims=True)
+    since = gyroscopes.time - gyroscopes.span / 2
+    powers = np.stack([np.ones_like(since), gyroscopes.time, since**2 / 2], axis=1)
+    weight = np.linalg.norm(gyroscopes.acceleration, axis=1, keepdims=True)
     weight = weight / np.sqrt(np.sum(weight**2))
     scale = np.abs(powers).max(axis=0)
     exact = np.linalg.inv(np.linalg.qr(weight * powers / scale)[1]) / scale[:, None]
@@ -195,47 +196,39 @@ def polynomials(seen: Gyroscopes) -> tuple[np.ndarray, np.ndarray]:
     return powers @ exact, exact
 
 
-@njit
-def _searched(bare, turn, turns, most, period, along, taken, together, reach):
+def _searched(residual, turn, turns, most, period, along, taken, together, reach):
     """Coefficients (3,) of ``along`` with the least cost of their sum, within a reach of zero."""
+    given = residual, turn, turns, most, period, along
     place = np.zeros(3)
-    best = _cost(bare, turn, turns, most, period, along, place, taken, together)
+    best = _cost(*given, place, taken, together)
     for order in (1, 2, 1):
         centre = place.copy()
-        for i in range(9):
-            for j in range(11):
-                trial = centre.copy()
-                trial[order] += reach * (i / 4 - 1)
-                trial[0] += reach * (j / 5 - 1)
-                found = _cost(bare, turn, turns, most, period, along, trial, taken, together)
-                if found < best:
-                    best, place = found, trial
+        for i, j in np.ndindex(9, 11):
+            trial = centre.copy()
+            trial[order] += reach * (i / 4 - 1)
+            trial[0] += reach * (j / 5 - 1)
+            found = _cost(*given, trial, taken, together)
+            if found < best:
+                best, place = found, trial
     return place
 
 
-@njit
-def _cost(bare, turn, turns, most, period, along, trial, taken, together):
+def _cost(residual, turn, turns, most, period, along, trial, taken, together) -> float:
     """Sum of the sizes of what is left, none beyond what a wrong turn costs: outliers count little.
 
     By clocks (K,) shifted along (T, 3); ``together``: an age common to all is the motion's then,
     else ``taken`` (T,) is.
     """
-    total = 0.0
-    for t in range(len(turns)):
-        shift = along[t, 0] * trial[0] + along[t, 1] * trial[1] + along[t, 2] * trial[2]
-        common = 0.5 + (shift if together else taken[t])
-        for k in range(turns.shape[1]):
-            place = turns[t, k] + shift
-            age = period[k] * (place - np.floor(place) - common)
-            off = 0.0
-            for axis in range(3):
-                off += abs(bare[t, k, axis] + age * turn[t, k, axis])
-            total += min(off, most[t, k])
-    return total
+    shift = along @ trial
+    common = 0.5 + (shift if together else taken)
+    place = turns + shift[:, None]
+    age = period * (place - np.floor(place) - common[:, None])
+    off = np.abs(residual + age[..., None] * turn).sum(axis=2)
+    return float(np.minimum(off, most).sum())
 
 
 def with_phases(readings: Readings, state: State, clocks: dict) -> Readings:
-    """The readings with the `wander` of clocks {imu: (P, f, phi, c, g)}.
+    """The readings with the `clock_deviation` of clocks {imu: (P, f, phi, c, g)}.
 
     ``state``: one of rough motion, `with_free_gyroscopes`.
     """
@@ -244,50 +237,50 @@ def with_phases(readings: Readings, state: State, clocks: dict) -> Readings:
     kept = readings.keep[:, imus, 3:].all(axis=2)
     used = kept.sum(axis=1) >= SETTINGS.enough
     steady = clock_turns(values.T, readings.time[:, None], readings.span)
-    seen = Gyroscopes(
+    gyroscopes = Gyroscopes(
         readings.time[used], readings.span, readings.values[used][:, imus, 3:],
         state.motion[used, 3:6],
     )  # fmt: skip
     noise = np.sqrt(np.mean(readings.declared[imus, 1] ** 2))
     stiffness = (noise / state.rough_prior.sd[used, 9:12]) ** 2
-    every = splines(readings.time, seen.time)
+    every = splines(readings.time, gyroscopes.time)
     shift, place, jumps = _phases(
-        seen, values[:, 0], steady[used], kept[used], stiffness, every[used]
+        gyroscopes, values[:, 0], steady[used], kept[used], stiffness, every[used]
     )
     turns = steady + every @ shift
     whole = np.floor(turns - place)
     whole[used] = jumps
-    wander = np.zeros(readings.values.shape[:2])
-    wander[:, imus] = turns - whole - (steady - np.floor(steady))
-    return replace(readings, wander=wander)
+    clock_deviation = np.zeros(readings.values.shape[:2])
+    clock_deviation[:, imus] = turns - whole - (steady - np.floor(steady))
+    return replace(readings, clock_deviation=clock_deviation)
 
 
-def splines(time, seen) -> np.ndarray:
-    """(T, B) cubic B-splines of ``time``, whose knots share the instants ``seen`` evenly."""
-    length = len(seen) * np.median(np.diff(seen))
+def splines(time, instants) -> np.ndarray:
+    """(T, B) cubic B-splines of ``time``, whose knots share ``instants`` evenly."""
+    length = len(instants) * np.median(np.diff(instants))
     spans = int(np.clip(length / SETTINGS.knot, 1, SETTINGS.most_knots))
-    inner = np.quantile(seen, np.linspace(0, 1, spans + 1))
+    inner = np.quantile(instants, np.linspace(0, 1, spans + 1))
     knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
     return BSpline.design_matrix(np.clip(time, inner[0], inner[-1]), knots, 3).toarray()
 
 
-def _phases(seen: Gyroscopes, period, steady, kept, stiffness, basis):
+def _phases(gyroscopes: Gyroscopes, period, steady, kept, stiffness, basis):
     """(coefficients (B, K) of turns to add, places of the jumps (K,), jumps so far (T, K))."""
     shift, place = np.zeros((basis.shape[1], len(period))), np.zeros(len(period))
     maps = np.tile(np.eye(4)[:3], (len(period), 1, 1))
     weights, turns, jumps = kept.astype(float), steady, np.floor(steady)
     for number in range(SETTINGS.phase_rounds):
         ages = period * (turns - jumps - 0.5)
-        motion, left = moved(seen, maps, ages, weights, stiffness)
+        motion, left = moved(gyroscopes, maps, ages, weights, stiffness)
         size = 1.4826 * np.median(np.abs(left[kept]))
         weights = kept * robust(left, size)
-        maps = remapped(seen, motion, ages, weights)
+        maps = remapped(gyroscopes, motion, ages, weights)
         slope = motion[:, None, 3:6] - ages[..., None] * motion[:, None, 6:]
         slope = -period[:, None] * np.einsum("kij,tkj->tki", maps[..., :3], slope)
-        told = kept * np.sum(slope**2, axis=2) / size**2
-        off = np.sum(slope * left, axis=2) / np.maximum(told * size**2, 1e-9)
-        clear = told * SETTINGS.around_jump**2 > 9.0
-        shift = shift + _smoothed(basis, off, weights * told)
+        information = kept * np.sum(slope**2, axis=2) / size**2
+        off = np.sum(slope * left, axis=2) / np.maximum(information * size**2, 1e-9)
+        clear = information * SETTINGS.around_jump**2 > 9.0
+        shift = shift + _smoothed(basis, off, weights * information)
         if number < SETTINGS.phase_rounds // 4 or not clear.any(axis=0).all():
             turns = steady + basis @ shift
             continue

@@ -106,27 +106,27 @@ def summed(gains) -> tuple[float, float]:
     return float(np.sum(gains)), float(np.std(gains, ddof=1) * np.sqrt(len(gains)))
 
 
-def gains_of(parts, prior, values, freed, spare=None, rival=None) -> np.ndarray:
+def gains_of(parts, prior, values, freed, nuisance=None, rival=None) -> np.ndarray:
     """Nats (B,) that ``freed`` (n,) bool parameters gain on each held-out block over zero.
 
     ``parts`` [(information (n, n), score (n,))] of the blocks at ``values`` (n,), ``prior`` its
     precision (n, n) and means (n,). Both rivals are trained without the block, the freed parameters
     shrunk as their score in the training blocks deserves (positive-part James-Stein, of as many as
-    data and not the prior determine). ``spare`` (n,) bool: parameters that both rivals have beside.
-    ``rival``, without spare ones: the precision (n, n) where the freed are zero, which pins no mean
-    that only all have, if not the same.
+    data and not the prior determine). ``nuisance`` (n,) bool: parameters that both rivals have.
+    ``rival``, without nuisance ones: the precision (n, n) where the freed are zero, which pins no
+    mean that only all have, if not the same.
     """
     information, score = sum(p[0] for p in parts), sum(p[1] for p in parts)
-    spare = np.zeros(len(freed), bool) if spare is None else spare
+    nuisance = np.zeros(len(freed), bool) if nuisance is None else nuisance
     ridge, off = prior[0], values - prior[1]
     rival = ridge if rival is None else rival
-    freed, values, gains = freed[~spare], values[~spare], []
+    freed, values, gains = freed[~nuisance], values[~nuisance], []
     # a pinned mean holds those of some IMUs no more than the other IMUs let it
-    own = _schur(ridge[np.ix_(~spare, ~spare)], freed)
+    own = _schur(ridge[np.ix_(~nuisance, ~nuisance)], freed)
     for part in parts:
         data, left = information - part[0], score - part[1]
-        trained, (block, slope) = _eliminated((data + ridge, left - ridge @ off), part, spare)
-        other = trained if spare.any() else (data + rival, left - rival @ off)
+        trained, (block, slope) = _eliminated((data + ridge, left - ridge @ off), part, nuisance)
+        other = trained if nuisance.any() else (data + rival, left - rival @ off)
         without = _solve(*other, values, freed, 0.0)
         full = np.linalg.solve(*trained)
         found = (full + values)[freed]
@@ -139,21 +139,21 @@ def gains_of(parts, prior, values, freed, spare=None, rival=None) -> np.ndarray:
     return np.array(gains)
 
 
-def _eliminated(trained, part, spare):
-    """Training and held-out block for the rest, the ``spare`` parameters where training puts them.
+def _eliminated(trained, part, nuisance):
+    """Training and held-out block of the rest, ``nuisance`` parameters where training puts them.
 
     Up to a constant of the block's.
     """
-    if not spare.any():
+    if not nuisance.any():
         return trained, part
-    (inner, score), (block, slope), rest = trained, part, ~spare
-    cross, held = inner[np.ix_(rest, spare)], block[np.ix_(spare, spare)]
-    solved = np.linalg.solve(inner[np.ix_(spare, spare)], np.column_stack([score[spare], cross.T]))
+    (inner, score), (block, slope), rest, out = trained, part, ~nuisance, nuisance
+    cross, held = inner[np.ix_(rest, out)], block[np.ix_(out, out)]
+    solved = np.linalg.solve(inner[np.ix_(out, out)], np.column_stack([score[out], cross.T]))
     at, back = solved[:, 0], solved[:, 1:]
-    left = block[np.ix_(rest, spare)] - back.T @ held
+    left = block[np.ix_(rest, out)] - back.T @ held
     reduced = inner[np.ix_(rest, rest)] - cross @ back, score[rest] - cross @ at
-    seen = block[np.ix_(rest, rest)] - left @ back - back.T @ block[np.ix_(spare, rest)]
-    return reduced, (seen, slope[rest] - back.T @ slope[spare] - left @ at)
+    reduced_block = block[np.ix_(rest, rest)] - left @ back - back.T @ block[np.ix_(out, rest)]
+    return reduced, (reduced_block, slope[rest] - back.T @ slope[out] - left @ at)
 
 
 def _schur(information, chosen):

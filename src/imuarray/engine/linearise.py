@@ -103,25 +103,25 @@ class Eliminated(NamedTuple):
     whitened: np.ndarray  # (T, N, 6, m), each IMU's readings by its own parameters
     basis: np.ndarray  # (T, 6 N, D) of what the motion can explain, orthonormal with its prior's
     inverse: np.ndarray  # (T, D, D) of the factor of the motion's information
-    taken: np.ndarray  # (T, D) the residual's coordinates in the basis
+    absorbed: np.ndarray  # (T, D) the residual's coordinates in the basis
     expected: np.ndarray  # (T, D, 3) omega_dot's prior in that basis; (T, D, 0) where it has none
-    unexpected: np.ndarray  # (T, 3) what is left of it, in its sds
-    course: np.ndarray  # (T, 3, N, m) derivatives of its mean, their sign turned, as of readings
+    innovation: np.ndarray  # (T, 3) what is left of it, in its sds
+    prior_slope: np.ndarray  # (T, 3, N, m) derivatives of its mean, sign turned as of readings
     log_volume: np.ndarray  # (T,) log determinant of the motion's information
     misfit: np.ndarray  # (T,) squared residuals, the prior's included
 
     @property
-    def through(self) -> np.ndarray:
+    def projected(self) -> np.ndarray:
         """(T, N, D, m), the derivative's coordinates in that basis."""
-        through = through_of(self.basis, self.whitened)
+        projected = projection_of(self.basis, self.whitened)
         if self.expected.shape[2]:
-            through += np.einsum("tdi,tikm->tkdm", self.expected, self.course)
-        return through
+            projected += np.einsum("tdi,tikm->tkdm", self.expected, self.prior_slope)
+        return projected
 
 
 def _instant(x, positions, extra, time, span) -> Instant:
     """Quantities that effects may look at, at one sample."""
-    jerk, force_rate, second, third, slow, wander = (*extra, None, 0.0)[:6]
+    jerk, force_rate, second, third, slow, deviation = (*extra, None, 0.0)[:6]
     own = None
     if len(x) > KNOWN:
         jerk, force_rate, slow = x[9:12], x[12:15], None
@@ -130,7 +130,8 @@ def _instant(x, positions, extra, time, span) -> Instant:
     if len(x) > 18:
         own = Turning(x[:3] + x[21:24], own.acceleration, jerk + x[18:21])
     motion = Motion(x[:3], x[3:6], x[6:9], jerk, force_rate)
-    return Instant(motion, positions, time, span, second, third, own, slow=slow, wander=wander)
+    more = {"slow": slow, "clock_deviation": deviation}
+    return Instant(motion, positions, time, span, second, third, own, **more)
 
 
 def reading(model, count, x, positions, parameters, extra, time, span):
@@ -141,7 +142,7 @@ def reading(model, count, x, positions, parameters, extra, time, span):
 
 def predicted(readings: Readings, model: ArrayModel, state: State, slopes=False):
     """(T, N, 6) readings at a state; and (T, N, 6, D) their ``slopes`` by the motion, if wanted."""
-    extra = (*state.derivatives, readings.wandered)
+    extra = (*state.derivatives, readings.clock_deviations)
     given = state.positions, state.parameters
     return jax.tree.map(np.asarray, _predicted(
         model, readings.values.shape[1], slopes, state.motion, extra, readings.time, readings.span,
@@ -213,8 +214,8 @@ def _course(readings: Readings, index, whitened, sd) -> np.ndarray:
     return slope / sd[..., None, None]
 
 
-def _eliminated(residual, motion, whitened, gram, bare, sd, course) -> Eliminated:
-    """A chunk, the motion projected out; ``bare`` (T, k) is what its prior expects, in sds.
+def _eliminated(residual, motion, whitened, gram, away, sd, prior_slope) -> Eliminated:
+    """A chunk, the motion projected out; ``away`` (T, k): of its prior, in sds.
 
     A prior of the motion's last k numbers, ``sd`` infinite where it has none.
     """
@@ -223,25 +224,25 @@ def _eliminated(residual, motion, whitened, gram, bare, sd, course) -> Eliminate
     factor = np.linalg.cholesky(gram)
     inverse = np.linalg.inv(factor)
     basis = motion @ np.swapaxes(inverse, 1, 2)
-    left, taken, unexpected, misfit = _less_motion(residual, basis, inverse, bare, sd)
+    left, absorbed, innovation, misfit = _less_motion(residual, basis, inverse, away, sd)
     volume = 2 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
-    first = course.shape[1]
+    first = prior_slope.shape[1]
     expected = (inverse[:, :, free] / sd[:, None])[..., :first]
     return Eliminated(
-        left, whitened, basis, inverse, taken, expected, unexpected[:, :first], course, volume,
-        misfit,
+        left, whitened, basis, inverse, absorbed, expected, innovation[:, :first], prior_slope,
+        volume, misfit,
     )  # fmt: skip
 
 
-def _less_motion(residual, basis, inverse, bare, sd):
+def _less_motion(residual, basis, inverse, away, sd):
     """(residual left, what the motion takes, what is left of its prior, misfit) of samples."""
     expected = inverse[:, :, inverse.shape[1] - sd.shape[1] :] / sd[:, None]
     flat = residual.reshape(len(residual), -1, 1)
-    taken = np.swapaxes(basis, 1, 2) @ flat + expected @ bare[..., None]
-    left = (flat - basis @ taken)[..., 0]
-    unexpected = (bare[..., None] - np.swapaxes(expected, 1, 2) @ taken)[..., 0]
-    misfit = np.sum(left**2, axis=1) + np.sum(unexpected**2, axis=1)
-    return left.reshape(residual.shape), taken[..., 0], unexpected, misfit
+    absorbed = np.swapaxes(basis, 1, 2) @ flat + expected @ away[..., None]
+    left = (flat - basis @ absorbed)[..., 0]
+    innovation = (away[..., None] - np.swapaxes(expected, 1, 2) @ absorbed)[..., 0]
+    misfit = np.sum(left**2, axis=1) + np.sum(innovation**2, axis=1)
+    return left.reshape(residual.shape), absorbed[..., 0], innovation, misfit
 
 
 def leverage_of(basis) -> np.ndarray:
@@ -249,7 +250,7 @@ def leverage_of(basis) -> np.ndarray:
     return np.einsum("tij,tij->ti", basis, basis).reshape(len(basis), -1, 6)
 
 
-def through_of(basis, whitened) -> np.ndarray:
+def projection_of(basis, whitened) -> np.ndarray:
     """(T, N, D, m) coordinates in the motion's basis of each IMU's derivatives (T, N, 6, m)."""
     return np.swapaxes(basis.reshape(*whitened.shape[:3], -1), 2, 3) @ whitened
 
@@ -274,12 +275,12 @@ def linearise(
     return Eliminated(*_joined(one, len(readings.values), spare))
 
 
-def seen_again(readings: Readings, columns: Columns, state: State, seen: Eliminated) -> Eliminated:
+def relinearised(readings: Readings, columns: Columns, state: State, last: Eliminated):
     """The residual at another state by the derivatives of one near by: a chord's, not a tangent's.
 
     Without the derivatives and the products of them, most of the work of `linearise`.
     """
-    count, first = readings.values.shape[1], seen.unexpected.shape[1]
+    count, first = readings.values.shape[1], last.innovation.shape[1]
 
     def one(start):
         index = padded(start, len(readings.values))
@@ -289,12 +290,13 @@ def seen_again(readings: Readings, columns: Columns, state: State, seen: Elimina
             state.positions, state.parameters,
         ))  # fmt: skip
         residual = readings.weights_of(index) * (readings.values[index] - values)
-        bare = (mean - x[:, x.shape[1] - sd.shape[1] :]) / sd
-        return _less_motion(residual, seen.basis[index], seen.inverse[index], bare, sd)
+        away = (mean - x[:, x.shape[1] - sd.shape[1] :]) / sd
+        basis, inverse = last.basis[index], last.inverse[index]
+        return _less_motion(residual, basis, inverse, away, sd)
 
-    left, taken, unexpected, misfit = _joined(one, len(readings.values))
-    return seen._replace(
-        residual=left, taken=taken, unexpected=unexpected[:, :first], misfit=misfit
+    left, absorbed, innovation, misfit = _joined(one, len(readings.values))
+    return last._replace(
+        residual=left, absorbed=absorbed, innovation=innovation[:, :first], misfit=misfit
     )
 
 
@@ -310,13 +312,13 @@ def chunk_at(readings: Readings, columns: Columns, state: State, directions, sta
     )  # fmt: skip
     residual, motion, whitened, gram = (np.asarray(part)[used] for part in made)
     index, x, mean, sd = (part[used] for part in (index, x, mean, sd))
-    bare = (mean - x[:, x.shape[1] - sd.shape[1] :]) / sd
+    away = (mean - x[:, x.shape[1] - sd.shape[1] :]) / sd
     whitened = whitened[..., directions]
-    course = np.zeros((len(index), 0, whitened.shape[1], len(directions)))
+    prior_slope = np.zeros((len(index), 0, whitened.shape[1], len(directions)))
     if state.turning is not None and state.turning.follows.any():
-        course = _course(readings, index, whitened, sd[:, :3])
+        prior_slope = _course(readings, index, whitened, sd[:, :3])
     # factorisations are LAPACK's, called from here (see `jax64`)
-    return _eliminated(residual, motion, whitened, gram.copy(), bare, sd, course)
+    return _eliminated(residual, motion, whitened, gram.copy(), away, sd, prior_slope)
 
 
 def padded(start: int, samples: int) -> np.ndarray:
@@ -326,7 +328,8 @@ def padded(start: int, samples: int) -> np.ndarray:
 
 def _rows_of(readings: Readings, state: State, index):
     """(motion, derivatives, the motion's prior) of the samples ``index``."""
-    extra = jax.tree.map(lambda field: field[index], (*state.derivatives, readings.wandered))
+    whole = *state.derivatives, readings.clock_deviations
+    extra = jax.tree.map(lambda field: field[index], whole)
     nothing = np.zeros((len(index), 0))
     prior = (nothing, nothing)
     if state.rough_prior is not None:

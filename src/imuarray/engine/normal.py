@@ -8,14 +8,14 @@ from imuarray.engine.linearise import CHUNK, THREADS
 from imuarray.engine.settings import SETTINGS
 
 
-def summed_normal(seen, chosen, part=slice(None)):
+def summed_normal(linearised, chosen, part=slice(None)):
     """`normal` of many samples, chunk by chunk: what is made of each is small."""
-    first, last, _ = part.indices(len(seen.residual))
+    first, last, _ = part.indices(len(linearised.residual))
 
     def over(starts):
         information, score = np.zeros((chosen.sum(), chosen.sum())), np.zeros(chosen.sum())
         for start in starts:
-            inner, slope = normal(seen, chosen, slice(start, min(start + CHUNK, last)))
+            inner, slope = normal(linearised, chosen, slice(start, min(start + CHUNK, last)))
             information += inner
             score += slope
         return information, score
@@ -25,48 +25,48 @@ def summed_normal(seen, chosen, part=slice(None)):
     return sum(inner for inner, _ in found), sum(slope for _, slope in found)
 
 
-def normal(seen, chosen, part):
+def normal(linearised, chosen, part):
     """Information (n, n) and score (n,) of the chosen parameters, motion projected out.
 
-    ``seen``: an `Eliminated` or a `Fit`.
+    ``linearised``: an `Eliminated` or a `Fit`.
     """
-    through, blocks = seen_through(seen.whitened[part], seen.basis[part], chosen)
-    course = np.empty((*seen.unexpected[part].shape, through.shape[2]))
+    projected, blocks = projected_columns(linearised.whitened[part], linearised.basis[part], chosen)
+    prior_slope = np.empty((*linearised.innovation[part].shape, projected.shape[2]))
     for imu, places, _ in blocks:
-        course[..., places] = seen.course[part, :, imu][..., chosen[imu]]
-    if course.shape[1]:
-        through += seen.expected[part] @ course
-    flat, prior = (x.reshape(x.shape[0] * x.shape[1], x.shape[2]) for x in (through, course))
+        prior_slope[..., places] = linearised.prior_slope[part, :, imu][..., chosen[imu]]
+    if prior_slope.shape[1]:
+        projected += linearised.expected[part] @ prior_slope
+    flat, prior = (x.reshape(x.shape[0] * x.shape[1], x.shape[2]) for x in (projected, prior_slope))
     information = prior.T @ prior - flat.T @ flat
     for _, places, block in blocks:
         own = block.reshape(-1, block.shape[-1])
         information[places, places] += own.T @ own
-    return information, score_of(seen, chosen, part)
+    return information, score_of(linearised, chosen, part)
 
 
-def score_of(seen, chosen, part=slice(None)):
+def score_of(linearised, chosen, part=slice(None)):
     """Score (n,) of the chosen parameters; the residual is orthogonal to the motion already."""
-    score = np.einsum("tkim,tki->km", seen.whitened[part], seen.residual[part])
-    score += np.einsum("tdkm,td->km", seen.course[part], seen.unexpected[part])
+    score = np.einsum("tkim,tki->km", linearised.whitened[part], linearised.residual[part])
+    score += np.einsum("tdkm,td->km", linearised.prior_slope[part], linearised.innovation[part])
     return score[chosen]
 
 
-def seen_through(whitened, basis, chosen):
+def projected_columns(whitened, basis, chosen):
     """The n ``chosen`` (N, m) bool in the motion's basis: (T, D, n), and [(imu, places, block)].
 
     A block is an IMU's own part of the derivatives ``whitened`` (T, N, 6, m), (T, 6, n_imu).
     """
     counts = chosen.sum(axis=1)
-    through, blocks = np.empty((len(basis), basis.shape[2], counts.sum())), []
+    projected, blocks = np.empty((len(basis), basis.shape[2], counts.sum())), []
     for imu in np.flatnonzero(counts):
         block = whitened[:, imu]
         if not chosen[imu].all():
             block = block[..., chosen[imu]]
         places = slice(counts[:imu].sum(), counts[: imu + 1].sum())
         own = np.swapaxes(basis[:, 6 * imu : 6 * imu + 6], 1, 2)
-        np.matmul(own, block, out=through[..., places])
+        np.matmul(own, block, out=projected[..., places])
         blocks.append((imu, places, block))
-    return through, blocks
+    return projected, blocks
 
 
 def uncorrelated(residual, basis, keep) -> np.ndarray:
@@ -77,7 +77,7 @@ def uncorrelated(residual, basis, keep) -> np.ndarray:
     anything; ``keep`` (..., 3) bool.
     """
     out, factor = np.empty_like(residual), np.zeros((*residual.shape, 3))
-    seen = keep.copy()
+    linearised = keep.copy()
     for i in range(3):  # Cholesky's factor and the forward substitution, all samples at once
         for j in range(i):
             known = np.sum(factor[..., i, :j] * factor[..., j, :j], axis=-1)
@@ -87,17 +87,17 @@ def uncorrelated(residual, basis, keep) -> np.ndarray:
         own -= np.sum(factor[..., i, :i] ** 2, axis=-1)
         clear = own > SETTINGS.least_free
         factor[..., i, i] = np.sqrt(np.where(clear, own, SETTINGS.least_free))
-        taken = np.sum(factor[..., i, :i] * out[..., :i], axis=-1)
-        out[..., i] = np.where(clear, residual[..., i] - taken, 0.0) / factor[..., i, i]
-        seen[..., i] &= clear
-    return np.where(seen, out, np.nan)
+        absorbed = np.sum(factor[..., i, :i] * out[..., :i], axis=-1)
+        out[..., i] = np.where(clear, residual[..., i] - absorbed, 0.0) / factor[..., i, i]
+        linearised[..., i] &= clear
+    return np.where(linearised, out, np.nan)
 
 
-def pick(through, chosen) -> tuple[np.ndarray, np.ndarray]:
+def pick(projected, chosen) -> tuple[np.ndarray, np.ndarray]:
     """The (imu, column) pairs (n, 2) of ``chosen`` (N, m) bool, and through's columns (T, D, n)."""
     pairs = np.argwhere(chosen)
-    seen = np.empty((len(through), through.shape[2], len(pairs)))
+    linearised = np.empty((len(projected), projected.shape[2], len(pairs)))
     for imu in np.unique(pairs[:, 0]):
         own = np.flatnonzero(pairs[:, 0] == imu)
-        seen[..., own] = through[:, imu][..., pairs[own, 1]]
-    return pairs, seen
+        linearised[..., own] = projected[:, imu][..., pairs[own, 1]]
+    return pairs, linearised

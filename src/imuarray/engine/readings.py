@@ -18,17 +18,17 @@ from imuarray.recording import Recording, array_of
 from imuarray.recording.record import neighbours
 
 
-class Left(NamedTuple):
+class ResidualMaps(NamedTuple):
     """Maps and offsets that a first-order correction left in the readings, as uncertain as it says.
 
     ``maps`` covariance (n, n) as `Recording.map_covariance`; ``offsets`` (N, 6, 4, 4) of each
     channel's offset as a polynomial of time, as `bias_drift` has it, of degree 0 where none
-    ``walks``; ``taken`` (n,) inverses of the maps that were taken out, None where that is unknown.
+    ``walks``; ``removed`` (n,) inverses of the maps that were taken out, None where unknown.
     """
 
     maps: np.ndarray
     offsets: np.ndarray
-    taken: np.ndarray | None = None
+    removed: np.ndarray | None = None
 
     @property
     def walks(self) -> bool:
@@ -39,11 +39,11 @@ class Left(NamedTuple):
         """True where one calibration corrected both: each may have made it, begun with its own."""
         if self.maps.shape != other.maps.shape:
             return False
-        if self.taken is None or other.taken is None:
+        if self.removed is None or other.removed is None:
             return np.array_equal(self.maps, other.maps)
         sds = np.sqrt(np.maximum(np.diag(self.maps), np.diag(other.maps)))
         return bool(
-            np.all(np.abs(self.taken - other.taken) <= SETTINGS.same_maps * sds + SETTINGS.same)
+            np.all(np.abs(self.removed - other.removed) <= SETTINGS.same_maps * sds + SETTINGS.same)
         )
 
 
@@ -62,13 +62,13 @@ class Readings:
     run : (T,) number of the gapless run a sample is in
     origin : s, where time begins in the recording's own
     scale_sd : of a scale common to all gyroscopes, NaN where nothing is known of it
-    left : `Left`, or None where no correction was made
+    left : `ResidualMaps`, or None where no correction was made
     gapless : bool, whether samples have neighbours that say something of time derivatives
     trust : (T, N, 2) square roots of a robust loss' weights, or None for all one
     period : s, of the clocks of sensors that have one, NaN where it is not declared
     clock_sd : relative, of the steps of time
     resolution : (N, 2) least step between a triad's readings
-    wander : (T, N) turns by which the IMUs' clocks depart from a steady drift, or None for none
+    clock_deviation : (T, N) turns by which clocks depart from a steady drift, or None for none
     labels : N str
     """
 
@@ -86,9 +86,9 @@ class Readings:
     gapless: bool = True
     origin: float = 0.0
     scale_sd: float = np.nan
-    left: Left | None = None
+    left: ResidualMaps | None = None
     trust: np.ndarray | None = None
-    wander: np.ndarray | None = None
+    clock_deviation: np.ndarray | None = None
     period: float = np.nan
     clock_sd: float = 0.0
     resolution: np.ndarray | None = None
@@ -114,10 +114,10 @@ class Readings:
         return self.array.accelerometers == 2
 
     @property
-    def wandered(self) -> np.ndarray:
-        """`wander`, zeros where there is none."""
+    def clock_deviations(self) -> np.ndarray:
+        """`clock_deviation`, zeros where there is none."""
         none = np.zeros(self.values.shape[:2])
-        return none if self.wander is None else self.wander
+        return none if self.clock_deviation is None else self.clock_deviation
 
     @property
     def window(self) -> int:
@@ -146,10 +146,12 @@ class Readings:
     def select(self, used) -> Self:
         """The samples in ``used`` (T,) bool, in new runs."""
         time = self.time[used]
-        trust, wander = (None if p is None else p[used] for p in (self.trust, self.wander))
+        trust, clock_deviation = (
+            None if p is None else p[used] for p in (self.trust, self.clock_deviation)
+        )
         return replace(
             self, time=time, values=self.values[used], keep=self.keep[used], run=runs(time),
-            trust=trust, wander=wander,
+            trust=trust, clock_deviation=clock_deviation,
         )  # fmt: skip
 
 
@@ -191,7 +193,7 @@ def part_of(readings: Readings, most: int) -> Readings:
     return _stretches(readings, stretch, np.isin(stretch, chosen))
 
 
-def most_informative(readings: Readings, say: Callable[[str], None]) -> Readings:
+def most_informative(readings: Readings, notify: Callable[[str], None]) -> Readings:
     """Stretches of a long recording that say most of the positions, by their rates' squares.
 
     A third of them for each coordinate: a board that spins for long about one axis tells two.
@@ -210,7 +212,7 @@ def most_informative(readings: Readings, say: Callable[[str], None]) -> Readings
         mean = np.bincount(stretch, told) / np.bincount(stretch)
         mean[best] = -1.0
         best[np.argsort(-mean)[: (number + coordinate) // 3]] = True
-    say(f"using the most informative {most} of {samples} samples")
+    notify(f"using the most informative {most} of {samples} samples")
     return _stretches(readings, stretch, best[stretch])
 
 
@@ -323,13 +325,13 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
     )  # fmt: skip
 
 
-def _left(recording: Recording, count: int) -> Left | None:
+def _left(recording: Recording, count: int) -> ResidualMaps | None:
     if recording.map_covariance is None:
         return None
-    offsets, taken = np.zeros((2, count, 3, 4, 4)), None
+    offsets, removed = np.zeros((2, count, 3, 4, 4)), None
     if recording.correction is not None:
         inverses = [recording.correction[f"{kind}_inverse"].to_numpy().ravel() for kind in KINDS]
-        taken = np.concatenate(inverses)[: len(recording.map_covariance)]
+        removed = np.concatenate(inverses)[: len(recording.map_covariance)]
         course = _course(recording)
         for kind, own in zip(KINDS, offsets, strict=True):
             inverse, sd, walk = (
@@ -340,7 +342,7 @@ def _left(recording: Recording, count: int) -> Left | None:
             own[: len(sd), :, 0, 0] = variance
             own[: len(sd)] += walk[:, None, None, None] ** 2 * course
     by_imu = np.moveaxis(offsets, 0, 1).reshape(count, 6, 4, 4)
-    return Left(recording.map_covariance, by_imu, taken)
+    return ResidualMaps(recording.map_covariance, by_imu, removed)
 
 
 def _course(recording: Recording) -> np.ndarray:

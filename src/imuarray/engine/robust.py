@@ -15,7 +15,7 @@ from imuarray.engine.normal import normal, uncorrelated
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings, by_triad
 from imuarray.engine.settings import SETTINGS
-from imuarray.estimation.threads import one_thread
+from imuarray.threads import one_thread
 
 FREEDOMS = np.array([3.0, 4.0, 6.0, 10.0, 20.0, 50.0, np.inf])
 
@@ -57,20 +57,20 @@ def normal_pass(
         here = state._replace(motion=motion)
         for _ in range(improved):
             motion[part] += linearise.motion_step(readings, columns, here, start)
-        seen = linearise.chunk_at(readings, columns, here, wanted, start)
-        residual, leverage = seen.residual, linearise.leverage_of(seen.basis)
+        chunk = linearise.chunk_at(readings, columns, here, wanted, start)
+        residual, leverage = chunk.residual, linearise.leverage_of(chunk.basis)
         left = np.where(readings.keep[part], 1.0 - leverage, 0.0)
         squares[part], freedom[part] = by_triad(residual**2), by_triad(left)
         own = uncorrelated(
-            residual.reshape(triads), seen.basis.reshape(*triads, seen.basis.shape[2]),
+            residual.reshape(triads), chunk.basis.reshape(*triads, chunk.basis.shape[2]),
             readings.keep[part].reshape(triads),
         )  # fmt: skip
         unit[part], number[part] = np.nansum(own**2, axis=-1), np.isfinite(own).sum(axis=-1)
         if not improved:
-            step = np.swapaxes(seen.inverse, 1, 2) @ seen.taken[..., None]
+            step = np.swapaxes(chunk.inverse, 1, 2) @ chunk.absorbed[..., None]
             motion[part] += step[..., 0]
-        rough = _seen_of_prior(here, motion[part], seen.inverse, part)
-        known = [(block, *normal(seen, few, rows)) for block, rows in _inside(blocks, part)]
+        rough = _seen_of_prior(here, motion[part], chunk.inverse, part)
+        known = [(block, *normal(chunk, few, rows)) for block, rows in _inside(blocks, part)]
         return known, rough
 
     with ThreadPoolExecutor(linearise.THREADS) as pool:
@@ -109,22 +109,22 @@ def _inside(blocks, part: slice) -> list[tuple[int, slice]]:
     return found
 
 
-def reweighted(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Readings:
+def reweighted(readings: Readings, one_pass: Pass, owned, former: np.ndarray) -> Readings:
     """The readings with each triad's scale and weights as the residual of a pass shows them.
 
     ``owned`` (N, 2): parameters that a triad's readings have paid for. ``former`` (2,): degrees of
     freedom of t; infinite for normal noise.
     """
-    free = seen.freedom.sum(axis=0)
+    free = one_pass.freedom.sum(axis=0)
     free = np.maximum(free - owned, 0.1 * free)
     trust = 1.0 if readings.trust is None else readings.trust
-    squares, distance = seen.squares / trust**2, distances(readings, seen)
+    squares, distance = one_pass.squares / trust**2, distances(readings, one_pass)
     ratio, weight, least = np.ones_like(free), np.ones_like(distance), least_ratio(readings)
     for kind, nu in enumerate(former):
         own = readings.exists[:, kind] & (free[:, kind] > 0)
         if readings.exists[:, kind].sum() == 1:  # nothing to hold it against: as declared
             continue
-        d, n, s = (part[:, own, kind] for part in (distance, seen.number, squares))
+        d, n, s = (part[:, own, kind] for part in (distance, one_pass.number, squares))
         if not np.isfinite(nu):
             ratio[own, kind] = np.maximum(s.sum(axis=0) / free[own, kind], least[own, kind])
             continue
@@ -146,19 +146,19 @@ def least_ratio(readings: Readings) -> np.ndarray:
     return (np.maximum(steps, SETTINGS.least_scale * readings.declared) / readings.sd) ** 2
 
 
-def distances(readings: Readings, seen: Pass) -> np.ndarray:
+def distances(readings: Readings, one_pass: Pass) -> np.ndarray:
     """Squared residuals of each triad in its own sds, its weight taken off, (T, N, 2)."""
-    return seen.unit if readings.trust is None else seen.unit / readings.trust**2
+    return one_pass.unit if readings.trust is None else one_pass.unit / readings.trust**2
 
 
-def freedoms(readings: Readings, seen: Pass) -> np.ndarray:
+def freedoms(readings: Readings, one_pass: Pass) -> np.ndarray:
     """Degrees of freedom (2,) that make the triads' distances likeliest, of each kind of sensor."""
-    found, far = np.full(2, np.inf), distances(readings, seen)
-    told = np.median(far / median_of(seen.number), axis=0) > least_ratio(readings)
+    found, far = np.full(2, np.inf), distances(readings, one_pass)
+    determined = np.median(far / median_of(one_pass.number), axis=0) > least_ratio(readings)
     for kind in range(2):
-        used = (seen.number[..., kind] > 0) & told[:, kind]
+        used = (one_pass.number[..., kind] > 0) & determined[:, kind]
         if used.any() and readings.exists[:, kind].sum() > 1:  # one alone is normal, as declared
-            own = far[..., kind][used], seen.number[..., kind][used]
+            own = far[..., kind][used], one_pass.number[..., kind][used]
             found[kind] = FREEDOMS[np.argmax([_log_likelihood(*own, nu) for nu in FREEDOMS])]
     return found
 

@@ -61,13 +61,15 @@ class Rough(NamedTuple):
                 now.readings, self.columns.model, now.state, every, self.rails, SETTINGS.rough_near
             )
             now = now._replace(state=now._moved(found.motion), converged=found.converged)
-            seen = normal_pass(now.readings, self.columns, now.state, nothing, improved=0)
+            one_pass = normal_pass(now.readings, self.columns, now.state, nothing, improved=0)
             last = number == SETTINGS.rough_rounds - 1
-            now = now._replace(readings=now._trusted(seen, SETTINGS.rough_freedom if last else 0.0))
-            if not last and now.readings.wander is not None:
+            least = SETTINGS.rough_freedom if last else 0.0
+            now = now._replace(readings=now._trusted(one_pass, least))
+            if not last and now.readings.clock_deviation is not None:
                 other, doubt, _ = now.turns()
-                wander = np.where(doubt > 0.5, other.wander, now.readings.wander)
-                now = now._replace(readings=replace(now.readings, wander=wander))
+                turns = now.readings.clock_deviation
+                turns = np.where(doubt > 0.5, other.clock_deviation, turns)
+                now = now._replace(readings=replace(now.readings, clock_deviation=turns))
         return now
 
     def _moved(self, motion) -> State:
@@ -79,17 +81,17 @@ class Rough(NamedTuple):
             prior = prior._replace(mean=mean)
         return self.state._replace(motion=motion, rough_prior=prior)
 
-    def _trusted(self, seen, least: float) -> Readings:
+    def _trusted(self, one_pass, least: float) -> Readings:
         """With the weights of Student's t, its scale each sample's own where that is larger.
 
         ``least``: degrees of freedom, if the estimate has fewer.
         """
-        readings, distance = self.readings, distances(self.readings, seen)
+        readings, distance = self.readings, distances(self.readings, one_pass)
         trust = np.ones(distance.shape)
         for kind, nu in enumerate(np.maximum(self.freedoms, least)):
             if not np.isfinite(nu):
                 continue
-            n, d, free = (part[..., kind] for part in (seen.number, distance, seen.freedom))
+            n, d, free = (part[..., kind] for part in (one_pass.number, distance, one_pass.freedom))
             squares, whole = np.where(n > 0, d / np.maximum(n, 1), 0.0) * free, free.sum(axis=1)
             scale = np.ones((len(n), 1))
             for _ in range(SETTINGS.rough_rounds):
@@ -106,10 +108,10 @@ class Rough(NamedTuple):
         readings, model = self.readings, self.columns.model
         values = model.split(self.state.parameters)[CLOCK]
         steady = clock_turns(values.T, readings.time[:, None], readings.span)
-        place = steady - np.floor(steady) + readings.wandered
+        place = steady - np.floor(steady) + readings.clock_deviations
         near = (np.abs(place - (place > 0.5)) < SETTINGS.around_jump) & (values[:, 1] != 0)
         step = near * np.where(place > 0.5, -1.0, 1.0)
-        other = replace(readings, wander=readings.wandered + step)
+        other = replace(readings, clock_deviation=readings.clock_deviations + step)
         read = [predicted(one, model, self.state) for one in (readings, other)]
         cost = [np.sum((readings.weights * (readings.values - p)) ** 2, axis=-1) for p in read]
         return other, near * expit((cost[0] - cost[1]) / 2), read[1] - read[0]
@@ -127,8 +129,8 @@ class Rough(NamedTuple):
         """(T, D, D) of the motion: noise as `fused` weighs it, and what the prior leaves."""
         out = []
         for first in range(0, len(self.state.motion), CHUNK):
-            seen = chunk_at(self.readings, self.columns, self.state, np.arange(0), first)
-            out.append(np.swapaxes(seen.inverse, 1, 2) @ seen.inverse)
+            one_pass = chunk_at(self.readings, self.columns, self.state, np.arange(0), first)
+            out.append(np.swapaxes(one_pass.inverse, 1, 2) @ one_pass.inverse)
         return self.lost * np.concatenate(out)
 
     def covariances(self, spread) -> tuple[np.ndarray, np.ndarray]:
@@ -143,7 +145,7 @@ class Rough(NamedTuple):
         nu = self.freedoms
         wide = np.array([n / (n - 2) if np.isfinite(n) else 1.0 for n in nu])
         variance += np.repeat(wide * self.readings.sd**2, 3, axis=1)
-        if self.readings.wander is not None:
+        if self.readings.clock_deviation is not None:
             _, doubt, change = self.turns()
             variance += (doubt * (1 - doubt))[..., None] * change**2
         return values, np.sqrt(variance)
@@ -198,4 +200,4 @@ def _timed(readings: Readings, state: State, one: Recorded, same, clocks) -> Rea
     other[same] = ~one.readings.keep
     other[..., :3] = False
     found = with_phases(readings.without(other), state._replace(motion=motion), clocks)
-    return replace(readings, wander=found.wander)
+    return replace(readings, clock_deviation=found.clock_deviation)

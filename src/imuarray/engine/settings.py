@@ -34,7 +34,7 @@ class Settings:
     wide: float = 10.0  # prior sd of the third derivatives, in sizes of the differences near by
     gyroscopes_own: float = 2.0  # prior sd of what gyroscopes alone see of omega_dot, in its steps
     offset: float = 1e-4  # s, of what they see of omega, for each of that
-    told: float = 0.03  # of these that readings must tell, for their sds to be estimated
+    determined: float = 0.03  # of these that readings must tell, for their sds to be estimated
     widening: float = 3.0  # factor by which an iteration may change such an sd
     farthest: float = 8.0  # of MacKay's steps at once, where they go on alike
     least_size: float = 1e-3  # of a size that is estimated, times what such sensors have
@@ -111,7 +111,7 @@ class Settings:
     least_scale: float = 1e-4  # of the declared noise
     # `fusion`
     fusion_tolerance: float = 1e-6  # sds, a step that ends the search
-    fusion_steps: int = 50  # of it
+    fusion_steps: int = 200  # of it
     pair_turns: int = 2  # in which a pair's rate and its derivatives follow each other
     # `rough_fusion`
     rough_rounds: int = 6  # of weights and turns

@@ -102,7 +102,7 @@ def start(readings: Readings, columns: Columns) -> State:
     positions = readings.array.relative
     used = readings.keep[..., 3:]
     rate = np.nanmedian(np.where(used, readings.values[..., 3:], np.nan), axis=1)
-    linear = _linear_motion(readings, positions, rate)
+    linear = linear_motion(readings, positions, rate)
     motion = np.concatenate([rate, linear], axis=1)
     parameters = np.zeros(columns.model.effect_size)
     found = State(motion, positions, parameters, no_derivatives(len(motion), len(positions)))
@@ -117,7 +117,7 @@ def start(readings: Readings, columns: Columns) -> State:
     return found._replace(motion=np.hstack([rate, found.turning.mean, linear[:, 3:]]))
 
 
-def _linear_motion(readings, positions, rate) -> np.ndarray:
+def linear_motion(readings, positions, rate) -> np.ndarray:
     """omega_dot and s (T, 6) of the accelerometers off their rails, given omega."""
     count = len(positions)
     both = design(positions)
@@ -154,7 +154,7 @@ def is_smooth(readings: Readings, motion) -> bool:
         return False
     worst = np.arange(len(readings.labels)) == np.argmax(off)
     few = readings.without(np.repeat([True, False], 3) & worst[:, None]).select(whole)
-    return follows(_linear_motion(few, places, rate[whole])[:, :3], slope[whole])
+    return follows(linear_motion(few, places, rate[whole])[:, :3], slope[whole])
 
 
 def with_derivatives(readings, state, smooth) -> State:

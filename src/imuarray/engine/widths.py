@@ -10,7 +10,7 @@ from scipy.special import chdtrc
 from imuarray.engine.estimate import Estimate, jackknifed, means, pinned, shown, tested
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, columns_of, stepped
-from imuarray.engine.readings import Left
+from imuarray.engine.readings import ResidualMaps
 from imuarray.engine.settings import SETTINGS
 from imuarray.linear import scaled_inverse, scaled_solve
 from imuarray.model.catalogue import OFF_COLUMNS, OFF_ROWS
@@ -24,7 +24,7 @@ OFFSETS = "accelerometer_bias", "gyroscope_bias"
 DRIFT = "bias_drift"
 
 
-def settled(found: Estimate) -> Estimate:
+def widened(found: Estimate) -> Estimate:
     """An estimate beside what a first-order correction left of maps and offsets.
 
     Each as uncertain as that. One step of everything at once: such errors are so small that it is
@@ -38,7 +38,7 @@ def settled(found: Estimate) -> Estimate:
     if any(left is None for left in lefts):
         return found
     wide = _with_maps(found)
-    maps = mask_of_left(lefts, wide.columns, wide.active)
+    maps = residual_map_mask(lefts, wide.columns, wide.active)
     active, count = wide.active | maps, len(found.values)
     names = np.array(wide.columns.names)[np.nonzero(maps)[1]]
     places, spread = _places_left(lefts, [spread_of(left, wide.columns, maps) for left in lefts],
@@ -103,10 +103,10 @@ def hausman(apart, wide, narrow) -> tuple[float, int]:
     """
     root = np.linalg.cholesky(wide)
     share = np.linalg.solve(root, np.linalg.solve(root, narrow).T)
-    told, axes = np.linalg.eigh(np.eye(len(wide)) - (share + share.T) / 2)
-    seen = told > SETTINGS.least_difference
-    along = (axes.T @ np.linalg.solve(root, apart))[seen]
-    return float(np.sum(along**2 / told[seen])), int(seen.sum())
+    determined, axes = np.linalg.eigh(np.eye(len(wide)) - (share + share.T) / 2)
+    informed = determined > SETTINGS.least_difference
+    along = (axes.T @ np.linalg.solve(root, apart))[informed]
+    return float(np.sum(along**2 / determined[informed])), int(informed.sum())
 
 
 def _places_left(lefts, spreads, of_maps, begin):
@@ -173,14 +173,14 @@ def lost(freedoms) -> float:
     return max((nu + 5) / (nu + 3) if np.isfinite(nu) else 1.0 for nu in freedoms)
 
 
-def corrected(*lefts: Left | None) -> tuple[str, ...]:
+def corrected(*lefts: ResidualMaps | None) -> tuple[str, ...]:
     """Effects of which a correction may have left something in some of a board's recordings."""
     if any(left is None for left in lefts):
         return ()
     return (*MAPS, DRIFT) if any(left.walks for left in lefts) else MAPS + OFFSETS
 
 
-def mask_of_left(lefts: Sequence[Left | None], columns: Columns, active) -> np.ndarray:
+def residual_map_mask(lefts: Sequence[ResidualMaps | None], columns: Columns, active) -> np.ndarray:
     """(N, m) bool of maps and offsets that corrections left, where they are not ``active``."""
     known, forces = corrected(*lefts), _accelerometers(columns)
     if any(len(left.maps) == forces for left in lefts if left is not None):
@@ -193,7 +193,7 @@ def _accelerometers(columns: Columns) -> int:
     return 9 * columns.model.array.accelerometers
 
 
-def spread_of(left: Left, columns: Columns, chosen) -> np.ndarray:
+def spread_of(left: ResidualMaps, columns: Columns, chosen) -> np.ndarray:
     """Covariance of the parameters ``chosen`` (N, m) bool, in their order, of those left.
 
     Entries that are known are not singular, but tight.
@@ -204,7 +204,7 @@ def spread_of(left: Left, columns: Columns, chosen) -> np.ndarray:
     return own + SETTINGS.fixed_map**2 * np.eye(len(own))
 
 
-def _entry(left: Left, columns: Columns, imu: int, column: int) -> int:
+def _entry(left: ResidualMaps, columns: Columns, imu: int, column: int) -> int:
     """Where a parameter is among the maps, triad by triad and row by row, and the offsets."""
     name, places = columns.names[column], columns.places[column]
     gyroscope, place = name.startswith("gyroscope"), places[-1]

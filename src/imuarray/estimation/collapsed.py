@@ -11,7 +11,7 @@ from imuarray.estimation import kernels
 from imuarray.estimation.rates import angular_rates
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel, structure_tensor
-from imuarray.motion import Motion
+from imuarray.motion import Motion, MotionEstimate
 
 TOLERANCE = 1e-10  # relative, of a step of omega from which a sample's search ends
 
@@ -169,21 +169,6 @@ class Collapsed:
             arms, force = self.weights[:, None] * positions, self.specific_force
         logdet = kernels.reduce(arms, force, self.base, self.energy, known.rows, known.values, out)
         return out, logdet
-
-
-@dataclass(frozen=True)
-class MotionEstimate:
-    """Motion per sample with its convergence.
-
-    ``motion`` fields (T, 3); ``cost`` (T,) twice the negative log likelihood up to a
-    constant;
-    ``iterations`` (T,) Gauss-Newton steps; ``converged`` (T,) bool.
-    """
-
-    motion: Motion
-    cost: np.ndarray
-    iterations: np.ndarray
-    converged: np.ndarray
 
 
 def estimate_motion(

@@ -107,12 +107,12 @@ def _rate_gram(rate, C, P, entries, left):
 
 
 @njit
-def _assemble(positions, weights, square, taken, out):
+def _assemble(positions, weights, square, absorbed, out):
     """diag(weights) (x) square less U taken U', row k of U weights[k] (1, r_k) (x) I; k > 1."""
     row = np.empty((3, 12))
     for k in range(1, len(positions)):
         (x, y, z), weight = positions[k], weights[k]
-        row[:] = taken[:3] + x * taken[3:6] + y * taken[6:9] + z * taken[9:]
+        row[:] = absorbed[:3] + x * absorbed[3:6] + y * absorbed[6:9] + z * absorbed[9:]
         for m in range(1, k + 1):
             (x, y, z), both = positions[m], weight * weights[m]
             for i in range(3):
@@ -126,7 +126,7 @@ def _assemble(positions, weights, square, taken, out):
 
 
 @njit
-def _moments(entries, linear, inverse, square, taken):
+def _moments(entries, linear, inverse, square, absorbed):
     """Fills square (3, 3) = sum_t Omega_t Omega_t', and taken (12, 12) by omega_dot and s.
 
     ``entries`` (3, 3, T) are Omega_t, ``linear`` (12, 6) = G_phi, by the arm and axis.
@@ -145,20 +145,20 @@ def _moments(entries, linear, inverse, square, taken):
                     for c in range(3):
                         for d in range(3):
                             total += seen[3 * m + c, 3 * n + d] * products[3 * i + c, 3 * j + d]
-                    taken[3 * m + i, 3 * n + j] = total
+                    absorbed[3 * m + i, 3 * n + j] = total
 
 
 @njit
 def fisher(positions, weights, rate, entries, found, P, known):
     """`information`, compiled; ``entries`` (3, 3, T) are Omega_t, P (3, 3, T) the gyroscopes'."""
-    square, taken = np.empty((3, 3)), np.empty((12, 12))
+    square, absorbed = np.empty((3, 3)), np.empty((12, 12))
     # what omega_dot and s take up, then what omega does
-    _moments(entries, known.linear, found.inverse, square, taken)
+    _moments(entries, known.linear, found.inverse, square, absorbed)
     left = (known.square - known.linear @ found.X).reshape(4, 3, 6)
-    taken += _rate_gram(rate, found.C, P, entries, left)
+    absorbed += _rate_gram(rate, found.C, P, entries, left)
     size = 3 * len(positions) - 3
     out = np.empty((size, size))
-    _assemble(positions, weights, square, taken, out)
+    _assemble(positions, weights, square, absorbed, out)
     return out
 
 

@@ -16,9 +16,9 @@ from imuarray.estimation.collapsed import Arrays, Collapsed, motion_estimate
 from imuarray.estimation.identifiability import Calibration, arranged, require_rotation
 from imuarray.estimation.information import fisher, information_at, slope
 from imuarray.estimation.rates import Work, most_likely, workspace
-from imuarray.estimation.threads import one_thread
 from imuarray.linear import FLOOR, scaled_eigh, scaled_inverse
 from imuarray.model import ArrayModel
+from imuarray.threads import one_thread
 
 FAR = 5.0  # length of the step before: the information is computed anew after a longer one
 SLOW = 0.05  # of the step before: and where steps contract less than so

@@ -8,7 +8,6 @@ import xarray as xr
 from scipy.linalg import block_diag
 
 from imuarray.errors import InputError, require, require_one_of
-from imuarray.estimation.threads import one_thread
 from imuarray.firstorder.gyroscopes import Gyroscopes, Still, calibrate_gyroscopes
 from imuarray.firstorder.outliers import fit_triads
 from imuarray.firstorder.pose_noise import walked_mean
@@ -32,6 +31,7 @@ from imuarray.recording.channels import repeated, require_apart, require_live, r
 from imuarray.recording.record import CORRECTION, NUMBERS
 from imuarray.recording.settings import SETTINGS as RECORDING
 from imuarray.recording.units import GRAVITY
+from imuarray.threads import one_thread
 
 GYROSCOPES = ("calibrate", "offset")
 
@@ -71,7 +71,7 @@ class FirstOrder:
     gyroscope_smoothing: np.ndarray
     gravity: float
     gyroscopes: Gyroscopes | None = None
-    spare: tuple[int, ...] = ()
+    left_out: tuple[int, ...] = ()
 
     @property
     def still_samples(self) -> int:
@@ -132,9 +132,9 @@ def calibrate_first_order(
     where axes are mirrored, rates have another unit, or channels or samples are copied.
     """
     every = _all_still([recording, *others], gyroscopes, shortest_pose)
-    spare = tuple(k for k, one in enumerate(every[1:], 1) if not _tells(one))
-    every = [one for k, one in enumerate(every) if k not in spare]
-    return replace(_calibrated(every, gravity, gyroscopes)[0], spare=spare)
+    left_out = tuple(k for k, one in enumerate(every[1:], 1) if not _tells(one))
+    every = [one for k, one in enumerate(every) if k not in left_out]
+    return replace(_calibrated(every, gravity, gyroscopes)[0], left_out=left_out)
 
 
 def calibrate_together(

@@ -154,8 +154,8 @@ class _Rows(NamedTuple):
             noise = noise._replace(walk=walk, factor=np.maximum(noise.factor * change[0], 1.0))
             if np.abs(np.log(walk / before)).max() < SETTINGS.walk_close:
                 break
-        taken = np.einsum("kmn,kinm->k", given, np.swapaxes(rows, -1, -2) @ rows)
-        return noise, float(np.min(3 * used.sum(axis=0) - taken))
+        absorbed = np.einsum("kmn,kinm->k", given, np.swapaxes(rows, -1, -2) @ rows)
+        return noise, float(np.min(3 * used.sum(axis=0) - absorbed))
 
 
 def _diagonal(values) -> np.ndarray:

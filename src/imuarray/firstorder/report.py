@@ -58,7 +58,7 @@ def summary_lines(found: FirstOrder, recording: Recording) -> list[str]:
     ratios = noise_table(found, recording).groupby("sensor").ratio.median()
     lines += [
         f"recording {number} of those beside it left out: still in two orientations at most"
-        for number in found.spare
+        for number in found.left_out
     ]
     lines += doubtful_lines(found, recording) + walk_lines(found, recording)
     lines += turned_lines(found, recording) + gyroscope_lines(found.gyroscopes, recording)

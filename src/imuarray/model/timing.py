@@ -147,7 +147,7 @@ def sensor_clock(clock, instant, predicted):
     """
     period, _, _, offset, _ = clock.T
     turns = clock_turns(clock.T, instant.time, instant.span)
-    age = offset + period * (turns - jnp.floor(turns) - 0.5 + instant.wander)
+    age = offset + period * (turns - jnp.floor(turns) - 0.5 + instant.clock_deviation)
     return later(-age, instant, predicted)
 
 

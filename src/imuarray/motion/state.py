@@ -38,6 +38,20 @@ class Motion(NamedTuple):
         return Motion(*(np.asarray(field)[index] for field in self))
 
 
+@dataclass(frozen=True)
+class MotionEstimate:
+    """Motion per sample with its convergence.
+
+    ``motion`` fields (T, 3); ``cost`` (T,) twice the negative log likelihood up to a
+    constant; ``iterations`` (T,) steps; ``converged`` (T,) bool.
+    """
+
+    motion: Motion
+    cost: np.ndarray
+    iterations: np.ndarray
+    converged: np.ndarray
+
+
 def lever(rate, acceleration, arm) -> np.ndarray:
     """Specific force that turning adds at an arm: omega x (omega x r) + omega_dot x r, (..., 3)."""
     return np.cross(rate, np.cross(rate, arm)) + np.cross(acceleration, arm)

@@ -256,12 +256,12 @@ def sphere(recording: Recording, calibration: xr.Dataset, axes: Axes | None = No
         for half in (30, 60):
             ring = np.sqrt(1 - np.cos(np.radians(half)))
             axes.add_patch(Circle((centre, 0), ring, fill=False, edgecolor="0.85", linewidth=0.5))
-        seen = turn[:, 2] * side >= 0
-        points = _disc(turn[seen], side, centre)
-        axes.scatter(*points, s=14 * size[seen] ** 2, color=BLUE, alpha=0.3, linewidth=0)
+        visible = turn[:, 2] * side >= 0
+        points = _disc(turn[visible], side, centre)
+        axes.scatter(*points, s=14 * size[visible] ** 2, color=BLUE, alpha=0.3, linewidth=0)
         poses = poses_of(recording)
-        seen = poses[:, 2] * side >= 0
-        axes.plot(*_disc(poses[seen], side, centre), "o", color=VERMILLION, markersize=6,
+        visible = poses[:, 2] * side >= 0
+        axes.plot(*_disc(poses[visible], side, centre), "o", color=VERMILLION, markersize=6,
                   markeredgecolor="white")  # fmt: skip
         for vector in np.vstack([np.eye(3), -np.eye(3)]):
             if vector[2] * side >= 0:

@@ -54,11 +54,11 @@ def unknown(readings: Readings, start, logs=None) -> Unknown:
     ``logs`` (5, K) maps the last K parameters to logs of factors on the sds that `SCALES` names.
     Raises InputError for a sample without gyroscopes.
     """
-    seen = readings.keep[..., 3:].any(axis=1).all(axis=1)
-    if not seen.all():
+    informed = readings.keep[..., 3:].any(axis=1).all(axis=1)
+    if not informed.all():
         raise InputError(
             "gyroscopes: expected one unsaturated per axis in every sample, found none in"
-            f" sample {np.flatnonzero(~seen)[0]} (and {np.sum(~seen) - 1} more)"
+            f" sample {np.flatnonzero(~informed)[0]} (and {np.sum(~informed) - 1} more)"
         )
     return Unknown(
         np.asarray(start), (readings.values, readings.weights, readings.time), readings.span,

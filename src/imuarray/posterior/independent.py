@@ -85,10 +85,10 @@ def centred(white: White, weigh: Callable, rng) -> White:
             break
         products = z * (weights - weights.mean())[:, None]
         slope, error = products.mean(axis=0), products.std(axis=0) / SETTINGS.pilot**0.5
-        seen = np.abs(slope) > SETTINGS.seen * error
-        if not seen.any():
+        observed = np.abs(slope) > SETTINGS.observed * error
+        if not observed.any():
             break
-        white = white._replace(centre=white.centre + white.factor @ np.where(seen, slope, 0.0))
+        white = white._replace(centre=white.centre + white.factor @ np.where(observed, slope, 0.0))
     return white
 
 

@@ -27,7 +27,7 @@ class MarginalData(NamedTuple):
     precision: jnp.ndarray  # (D, D) Lambda
     mean: jnp.ndarray  # (T, 3) rad/s, of p(omega | y_g)
     information: jnp.ndarray  # (T, 3, 3), its inverse covariance
-    seen: jnp.ndarray  # (T, 3) rad/s, the gyroscopes' own mean
+    observed: jnp.ndarray  # (T, 3) rad/s, the gyroscopes' own mean
     prior: jnp.ndarray  # s^2/rad^2, what of ``information`` is omega's prior: zero where flat
     ridge: jnp.ndarray  # (6,) the prior's part of H' Lambda H's diagonal, zero where flat
     start: jnp.ndarray  # (T, 3) rad/s, where the search for each mode begins
@@ -59,9 +59,9 @@ def collapse(positions, data: MarginalData):
     known = design.T @ data.precision @ design
     factor = cholesky(known[6:, 6:] + jnp.diag(data.ridge))
     half = solve_lower(factor, known[6:, :6])
-    seen = data.weighted @ design
-    inner = solve_lower(factor, seen[:, 6:].T)
-    b = seen[:, :6] - inner.T @ half
+    observed = data.weighted @ design
+    inner = solve_lower(factor, observed[:, 6:].T)
+    b = observed[:, :6] - inner.T @ half
     constant = data.energy - jnp.sum(inner**2, axis=0)
     return known[:6, :6] - half.T @ half, b, constant, log_determinant(factor)
 
@@ -77,10 +77,10 @@ def scaled(data: MarginalData, logs):
     own = gyroscopes * (data.information - data.prior * jnp.eye(3))
     prior = rate * data.prior
     factor = jax.vmap(cholesky)(own + prior * jnp.eye(3))
-    pulled = jnp.einsum("tij,tj->ti", own, data.seen)
+    pulled = jnp.einsum("tij,tj->ti", own, data.observed)
     mean = jax.vmap(lambda f, h: solve_upper(f, solve_lower(f, h[:, None]))[:, 0])(factor, pulled)
     volume = jnp.sum(jnp.log(jnp.diagonal(factor, axis1=1, axis2=2)))
-    apart = gyroscopes * data.spread[0] + prior * jnp.sum(mean * data.seen)
+    apart = gyroscopes * data.spread[0] + prior * jnp.sum(mean * data.observed)
     evidence = -0.5 * apart - volume - 3 * len(mean) * jnp.sum(logs[2:])
     evidence -= data.weighted.size * logs[0] + data.spread[1] * logs[1]
     return data._replace(
@@ -232,10 +232,10 @@ class Marginal:
         weighted = collapsed.weighted.reshape(-1, collapsed.samples).T
         information = np.linalg.inv(covariance)
         prior = float(motion_sd[0]) ** -2.0
-        seen = collapsed.mean.T if prior else mean
+        observed = collapsed.mean.T if prior else mean
         parts = (
             weighted, collapsed.energy, collapsed.precision, mean, information,
-            seen, prior, np.repeat([float(motion_sd[1]) ** -2.0, 0.0], 3), start,
+            observed, prior, np.repeat([float(motion_sd[1]) ** -2.0, 0.0], 3), start,
             0.5 * np.sum(np.linalg.slogdet(information)[1]), np.array(spread, float),
         )  # fmt: skip
         data = MarginalData(*map(jnp.asarray, parts))

@@ -21,7 +21,7 @@ class Settings:
     block: int = 50  # densities that one call evaluates
     pilot: int = 200  # draws that look for the centre
     rounds: int = 5  # of looking
-    seen: float = 4.0  # standard errors by which it is off, at which it is moved
+    observed: float = 4.0  # standard errors by which it is off, at which it is moved
     unreliable: float = 0.7  # of Pareto's k: above, the normal says nothing of the tails
     # `marginal`
     node_error: float = 1e-4  # nats in total from one count to the next: then the former is taken

@@ -35,23 +35,23 @@ def form_of(path: Path, named: set[str], given: dict) -> tuple[dict, list[str]]:
             found = len(named & set(cells_of(line, delimiter)))
             if found > best:
                 best, skip, sep = found, number, delimiter
-    bare = best < len(named) and all(name.isdigit() for name in named)
-    if bare:
+    headless = best < len(named) and all(name.isdigit() for name in named)
+    if headless:
         skip, sep = begin_of(lines, asked)
         skip -= 1
     comma = sep != "," and any(
         DECIMAL_COMMA.fullmatch(cell) for line in lines[skip + 1 :] for cell in cells_of(line, sep)
     )
     below = cells_of("".join(lines[skip + 1 : skip + 2]), sep)
-    units = best > 0 and not bare and are_words(below)
+    units = best > 0 and not headless and are_words(below)
     said = [f"encoding {encoding}"] * (encoding != "utf-8")
-    said += ["no header: columns by their place"] * bare
+    said += ["no header: columns by their place"] * headless
     said += [f"{skip} lines before the header left out"] * (skip > 0)
     said += [f"columns parted by {sep!r}"] * (sep != (asked or ","))
     said += ["decimal commas"] * comma + ["a line of units below the header left out"] * units
     options = given | {
-        "sep": sep, "skiprows": [*range(skip + bare), *[skip + 1] * units], "encoding": encoding,
-        "decimal": "," if comma else ".", "header": None if bare else 0,
+        "sep": sep, "skiprows": [*range(skip + headless), *[skip + 1] * units],
+        "encoding": encoding, "decimal": "," if comma else ".", "header": None if headless else 0,
     }  # fmt: skip
     return options, [f"{path.name}: {', '.join(said)}"] if said else []
 

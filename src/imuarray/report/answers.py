@@ -223,14 +223,14 @@ def gained(diagnosis: Diagnosis) -> Answer:
 def readings_in_words(causes) -> list[str]:
     """Where readings count that were left out or turned back."""
     gaining = [DATA_EFFECTS.get(c["effect"]) for c in causes if c["heldout_gain_nats"] > 0]
-    mended = [item for item in gaining if item and item.kind == "readings"]
+    corrected = [item for item in gaining if item and item.kind == "readings"]
     said = []
-    if any(item.left_out for item in mended):
+    if any(item.left_out for item in corrected):
         said.append(
             "Readings that are left out count in the nats, by how far they miss what the extended"
             " model predicts; neither the residuals nor the positions have them."
         )
-    if not all(item.left_out for item in mended):
+    if not all(item.left_out for item in corrected):
         said.append(
             "Axes that are turned back count in all of these numbers: the plain model takes the"
             " readings as they were recorded."

@@ -271,8 +271,8 @@ def position_of_block(signal: Signal, imu, chosen, part):
     """(mean time, offset (3,) m, its sd, the same of the step alone) over some samples."""
     made = signal.made
     own = made.whitened[part, imu][..., chosen].reshape(-1, 3)
-    through = made.through(chosen)[part, imu].reshape(-1, 3)
-    inverse = scaled_inverse(own.T @ own - through.T @ through)
+    projected = made.projected(chosen)[part, imu].reshape(-1, 3)
+    inverse = scaled_inverse(own.T @ own - projected.T @ projected)
     seen, step = (
         inverse @ (own.T @ np.nan_to_num(values[part, imu]).ravel())
         for values in (signal.total, signal.explained)

@@ -41,7 +41,7 @@ def require_fit(calibration: xr.Dataset, recording: Recording | None = None) -> 
             _require_numbers(calibration[name], dimensions)
         elif name in needed:
             raise InputError(f"expected a calibration (imuarray calibrate), found no {name}")
-    _require_right_axes(str(calibration.attrs.get("mended", "")).split())
+    _require_right_axes(str(calibration.attrs.get("corrected_readings", "")).split())
     if recording is not None:
         require_labels(calibration, recording)
     if "effect_parameter" in calibration:
@@ -54,12 +54,12 @@ def require_fit(calibration: xr.Dataset, recording: Recording | None = None) -> 
         _require_board(calibration, recording)
 
 
-def _require_right_axes(mended: Iterable[str]) -> None:
+def _require_right_axes(corrected: Iterable[str]) -> None:
     """InputError where readings were mended in memory: those of the file are as they were.
 
-    ``mended``: data effects that a diagnosis has found.
+    ``corrected``: data effects that a diagnosis has found.
     """
-    for name in mended:
+    for name in corrected:
         right = name in DATA_EFFECTS and DATA_EFFECTS[name].left_out
         found = f"{name}: give the axes in columns.yaml, convert the log again, and calibrate that"
         require(right, "", "a calibration of readings with the right axes", found)

@@ -48,22 +48,22 @@ def reasons_of_calibration(
         residual = residuals(recording, calibration, places)
         if len(several) == 1:
             little = _little(recording, places)
-        judged = _judged(recording, places, residual, limit)
-        units = [reason for reason in judged if UNIT.search(reason)]
-        judged += _drifts(recording) if is_papers(calibration) else []
-        for reason in [*units, *known] if units else [*little, *known, *filters, *judged]:
+        reasons = _judged(recording, places, residual, limit)
+        units = [reason for reason in reasons if UNIT.search(reason)]
+        reasons += _drifts(recording) if is_papers(calibration) else []
+        for reason in [*units, *known] if units else [*little, *known, *filters, *reasons]:
             found.setdefault(reason, []).append(str(number))
-    judged = [
+    reasons = [
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
         for reason, whose in found.items()
     ]
-    judged += _moved_maps(calibration) + changed(calibration)
-    judged += _grows(calibration) + _arms(calibration)
-    if not judged:
+    reasons += _moved_maps(calibration) + changed(calibration)
+    reasons += _grows(calibration) + _arms(calibration)
+    if not reasons:
         corrected = all(one.correction is not None for one in several)
-        judged = unsteady(calibration, corrected, len(several))
+        reasons = unsteady(calibration, corrected, len(several))
     root = little or any(map(UNIT.search, found))
-    return judged + ([] if root else _not_converged(calibration.attrs))
+    return reasons + ([] if root else _not_converged(calibration.attrs))
 
 
 def _filters(calibration: xr.Dataset) -> list[str]:

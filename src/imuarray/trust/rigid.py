@@ -22,7 +22,7 @@ class Turning(NamedTuple):
     rate: np.ndarray  # rad/s
     acceleration: np.ndarray  # rad/s^2, in the directions that are seen
     force: np.ndarray  # m/s^2, at the origin of the positions
-    seen: np.ndarray  # (3, 3), onto those directions
+    informed: np.ndarray  # (3, 3), onto those directions
 
     def at(self, positions) -> np.ndarray:
         """Specific force of triads at ``positions`` (A, 3) m, (T, A, 3) m/s^2."""
@@ -38,11 +38,11 @@ def turning(force, rate, positions) -> Turning:
     mean = left.mean(axis=1)
     moment = np.sum(arms**2) * np.eye(3) - arms.T @ arms
     sizes, axes = np.linalg.eigh(moment)
-    seen = axes[:, sizes > SETTINGS.known_axis * sizes[-1]]
-    inverse = seen @ np.diag(1 / sizes[sizes > SETTINGS.known_axis * sizes[-1]]) @ seen.T
+    informed = axes[:, sizes > SETTINGS.known_axis * sizes[-1]]
+    inverse = informed @ np.diag(1 / sizes[sizes > SETTINGS.known_axis * sizes[-1]]) @ informed.T
     turn = np.cross(arms, left - mean[:, None]).sum(axis=1) @ inverse
     at_origin = mean - np.cross(rate, np.cross(rate, middle)) - np.cross(turn, middle)
-    return Turning(rate, turn, at_origin, seen @ seen.T)
+    return Turning(rate, turn, at_origin, informed @ informed.T)
 
 
 def runs(time) -> np.ndarray:
@@ -86,7 +86,7 @@ def slope(time, motion: Turning) -> Slope | None:
     four = first[:, None] + np.arange(4)
     turn = motion.acceleration[four]
     steps = (time[first + 2] - time[first + 1])[:, None]
-    change = (motion.rate[first + 2] - motion.rate[first + 1]) @ motion.seen
+    change = (motion.rate[first + 2] - motion.rate[first + 1]) @ motion.informed
     whole = np.einsum("k,tkc->tc", WEIGHTS, turn) * steps
     size = np.sum(whole**2, axis=1)
     share = np.sum(change * whole, axis=1)[size > np.median(size)] / size[size > np.median(size)]
@@ -94,19 +94,19 @@ def slope(time, motion: Turning) -> Slope | None:
     # the instants of the two kinds may differ
     late = turn[:, 2] - turn[:, 1]
     jerk = np.linalg.norm(late, axis=1)
-    calm = jerk <= np.median(jerk)
-    x, y, lag = (part[calm].ravel() for part in (whole, change, late))
+    smooth = jerk <= np.median(jerk)
+    x, y, lag = (part[smooth].ravel() for part in (whole, change, late))
     if lag @ lag > 0:
         x, y = (part - lag * (lag @ part) / (lag @ lag) for part in (x, y))
     # the trapezium's error is (w dt)^2 / 12 of a wave, this rule's 11 / 720 (w dt)^4
     trapezium = (turn[:, 1] + turn[:, 2]) / 2 * steps
-    rough = np.sum((whole - trapezium)[calm] ** 2) / max(np.sum(whole[calm] ** 2), 1e-300)
+    rough = np.sum((whole - trapezium)[smooth] ** 2) / max(np.sum(whole[smooth] ** 2), 1e-300)
     xx, yy, xy = x @ x, y @ y, x @ y
     if not (xx > 0 and yy > 0) or xy == 0:
         return None
     forward, reverse = xy / xx, yy / xy
     correlation = xy / np.sqrt(xx * yy)
-    sd = np.sqrt(np.sum((y - forward * x) ** 2) / xx / calm.sum())
+    sd = np.sqrt(np.sum((y - forward * x) ** 2) / xx / smooth.sum())
     low, high = sorted((float(forward), float(reverse)))
     return Slope(
         low, high, float(sd), float(correlation), float(SETTINGS.coarse * rough),

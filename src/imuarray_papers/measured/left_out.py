@@ -23,7 +23,7 @@ from imuarray.engine.parameters import POSITION, columns_of, stepped
 from imuarray.engine.readings import Readings
 from imuarray.engine.robust import normal_pass
 from imuarray.engine.settings import SETTINGS
-from imuarray.engine.widths import settled
+from imuarray.engine.widths import widened
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import calibrate_first_order, calibrate_together, correct
 from imuarray.model import ArrayModel
@@ -49,7 +49,7 @@ def left_out(
     firsts = calibrate_together(others, **options)
     corrected = [correct(one, first) for one, first in zip(others, firsts, strict=True)]
     own = calibrate_first_order(recording, gyroscopes="offset", **options)
-    calibration = engine_dataset(corrected, settled(board_of([used(one) for one in corrected])))
+    calibration = engine_dataset(corrected, widened(board_of([used(one) for one in corrected])))
     triads = replace(own.triads, matrix=firsts[0].triads.matrix)
     of_board = replace(own, triads=triads, gyroscopes=firsts[0].gyroscopes)
     return correct(recording, of_board), calibration

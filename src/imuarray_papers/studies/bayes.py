@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from imuarray.estimation.selection import disjoint
+from imuarray.analysis.selection import disjoint
 from imuarray.geometry import Array
 from imuarray.motion import hand_twisting, normal_motion
 from imuarray.posterior.chains import chain_tree

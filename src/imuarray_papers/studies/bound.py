@@ -209,10 +209,10 @@ def ranks(cases) -> pd.DataFrame:
         # a coordinate of which nothing is known must not be scaled up to something
         scale = np.sqrt(np.maximum(np.diag(known), SETTINGS.rank * np.diag(known).max()))
         values = scaled_eigh(known, scale).values
-        seen = values > SETTINGS.rank * values[-1]
+        informed = values > SETTINGS.rank * values[-1]
         rows.append(
             {"case": name, "samples": len(motion.angular_rate), "unknowns": len(known),
-             "rank": int(seen.sum()), "condition": float(values[-1] / values[seen][0])}
+             "rank": int(informed.sum()), "condition": float(values[-1] / values[informed][0])}
         )  # fmt: skip
     return pd.DataFrame(rows)
 

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from imuarray.errors import InputError
-from imuarray.estimation.collapsed import Collapsed, motion_from
 from imuarray.geometry.array import require_planar_extent
-from imuarray.model import ArrayModel
-from imuarray.recording import Recording, array_of
+from imuarray.model.structure import design, products
+from imuarray.recording import Recording
 from imuarray.recording.channels import require_once
 from imuarray.recording.record import few, neighbours
 
@@ -62,14 +61,13 @@ def information(recording: Recording) -> np.ndarray:
     """Size of A_t = Omega(omega)^2 + Omega(omega_dot), (T,) 1/s^2: how a position shows itself.
 
     omega is the gyroscopes' mean; omega_dot comes from the accelerometers at their nominal
-    positions.
+    positions, by least squares given omega.
     """
-    sds, sizes = (recording.accelerometer_noise_sd, recording.gyroscope_noise_sd), []
-    model = ArrayModel.isotropic(array_of(recording), *sds)
+    both, sizes = design(recording.relative_positions()), []
     for part in recording.parts():
-        data = Collapsed.of(model, part.specific_force, part.angular_rate)
-        turn = motion_from(data, model.array.relative).motion.angular_acceleration
         rate = part.angular_rate.mean(axis=1)
+        force = part.specific_force.reshape(len(rate), -1) - products(rate) @ both[:, :6].T
+        turn = np.linalg.lstsq(both[:, 6:], force.T)[0][:3].T
         # |Omega(w)^2|_F^2 = 2 |w|^4, |Omega(w')|_F^2 = 2 |w'|^2, and the two are orthogonal
         squares = 2 * np.sum(rate**2, axis=1) ** 2 + 2 * np.sum(turn**2, axis=1)
         sizes.append(np.sqrt(squares))
