@@ -13,7 +13,7 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Cause, Search, prune
 from imuarray.engine.heldout import gains_of, summed
 from imuarray.engine.parameters import catalogue_effects, columns_of
-from imuarray.engine.readings import arrange
+from imuarray.engine.readings import ResidualMaps, arrange
 from imuarray_papers.blind.cases import Case, make
 
 EVERY, LIMIT = tuple(range(8)), -7.5
@@ -64,6 +64,28 @@ def test_a_sample_after_a_gap_may_repeat_the_one_that_is_gone():
     assert cause.imus == (2,)
     assert list(np.flatnonzero(lost[:, 2].all(axis=1))) == [50, 120, 240, 290]
     assert not lost[:, [0, 1, 3, 4, 5, 6, 7]].any()
+
+
+def test_steps_that_a_correction_has_mixed_repeat_by_chance():
+    """Slow coarse gyroscopes repeat all axes now and then, under a map as without; not more."""
+    rng, count = np.random.default_rng(5), 8
+    plain = arrange(make(Case("all-coarse", duration=8.0), 4)[0])
+    values = plain.values.copy()
+    slow = values[: len(values) // 4, :, 3:]
+    slow[:] = 0.02 * rng.standard_normal(slow.shape)  # noise of one step
+    values[..., 3:] = np.round(values[..., 3:] / 0.02) * 0.02
+    inverse = np.eye(3) + 0.01 * rng.standard_normal((2 * count, 3, 3))
+    mixed = values.copy()
+    mixed[..., 3:] = np.einsum("kij,tkj->tki", inverse[count:], values[..., 3:])
+    left = ResidualMaps(np.eye(1), np.zeros((count, 6, 4, 4)), inverse.ravel())
+    again = (values[1:, :, 3:] == values[:-1, :, 3:]).all(axis=2)
+    assert again.sum() > 20
+    stale = mixed.copy()
+    stale[400:700:20, 2, 3:] = mixed[399:699:20, 2, 3:]
+    for given, imus in ((mixed, ()), (stale, (2,))):
+        causes, lost = find_repeats(replace(plain, values=given, left=left))
+        assert tuple(imu for cause in causes for imu in cause.imus) == imus
+        assert not imus or lost[400:700:20, 2, 3].all()
 
 
 def test_triads_that_move_at_one_instant():

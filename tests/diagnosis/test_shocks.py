@@ -1,5 +1,6 @@
 """Shocks are told from a single IMU's outliers and from slow misfit."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -85,3 +86,19 @@ def test_nothing_else_is_a_shock(effect, imus, size):
     made, _ = fitted(effect, imus, size)
     named, shaken = find_shocks(made, SETTINGS.limit(SHOCK))
     assert named is None and not shaken.any()
+
+
+def test_the_only_gyroscope_cannot_be_left_out():
+    """Without its IMU nothing is left over: each sample would be a shock."""
+    recording, _ = make(Case("shocks-one", duration=3.0), 3)
+    few = replace(
+        recording, specific_force=recording.specific_force[:, :4],
+        angular_rate=recording.angular_rate[:, :1],
+        accelerometer_position=recording.accelerometer_position[:4],
+        accelerometer_labels=recording.accelerometer_labels[:4],
+        gyroscope_labels=recording.gyroscope_labels[:1],
+    )  # fmt: skip
+    readings = arrange(few)
+    columns = columns_of(readings.array, (), readings.position_prior_sd)
+    search = Search(readings, columns, (), lambda text: None).fitted()
+    assert find_shocks(search.fit, SETTINGS.limit(SHOCK))[0] is None

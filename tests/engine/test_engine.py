@@ -1,6 +1,7 @@
 """The engine's least squares against a dense one, its noise, its robustness, joint recordings."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import jax
 import numpy as np
@@ -9,7 +10,15 @@ from scipy.stats import kstest
 
 import imuarray
 from imuarray.engine.dataset import engine_dataset
-from imuarray.engine.estimate import Recorded, _passed, estimate, jackknifed, means, to_come
+from imuarray.engine.estimate import (
+    Recorded,
+    _passed,
+    estimate,
+    jackknifed,
+    means,
+    steady,
+    to_come,
+)
 from imuarray.engine.estimate import tested as at_more
 from imuarray.engine.forward import _of_one_truth, select_forward
 from imuarray.engine.linearise import linearise, reading, relinearised
@@ -17,7 +26,8 @@ from imuarray.engine.normal import uncorrelated
 from imuarray.engine.parameters import POSITION, columns_of, stepped
 from imuarray.engine.readings import arrange, most_informative, resolution
 from imuarray.engine.robust import normal_pass
-from imuarray.engine.start import turned
+from imuarray.engine.settings import SETTINGS
+from imuarray.engine.start import _slope_prior, gain_error, start, turned
 from imuarray.engine.widths import (
     _with_maps,
     hausman,
@@ -458,16 +468,53 @@ def test_a_block_that_holds_most_of_the_information_widens_no_sd(known):
     assert known or (np.mean(plain, axis=0) > 3 * formal).any()
 
 
-def test_a_triads_residual_is_as_many_normal_ones_as_the_motion_leaves():
+@pytest.mark.parametrize("lost", [[0.36, 0.48, 0.8], [0.6, 0.8, 0.0], [1.0, 0.0, 0.0]])
+def test_a_triads_residual_is_as_many_normal_ones_as_the_motion_leaves(lost):
     """A triad that lies in the motion's basis but for two directions: two, of their chi-square."""
-    rng = np.random.default_rng(3)
-    basis = np.linalg.qr(rng.standard_normal((50, 3, 3)))[0] * [1.0, 0.4, 0.9]
+    rng, sizes = np.random.default_rng(3), [1.0, 0.4, 0.9]
+    axes = np.concatenate([np.array(lost)[:, None], rng.standard_normal((3, 2))], axis=1)
+    basis = np.tile(np.linalg.qr(axes)[0] * sizes, (50, 1, 1))
     inside = np.eye(3) - basis @ basis.swapaxes(1, 2)
     residual = np.einsum("tij,tj->ti", inside, rng.standard_normal((50, 3)))
     found = uncorrelated(residual, basis, np.ones((50, 3), bool))
     assert (np.isfinite(found).sum(axis=1) == 2).all()
     expected = np.einsum("ti,tij,tj->t", residual, np.linalg.pinv(inside, 1e-6), residual)
     np.testing.assert_allclose(np.nansum(found**2, axis=1), expected, rtol=1e-2)
+
+
+def test_a_calm_stretch_does_not_stand_for_the_fast_ones():
+    """A polynomial's gain in motion of 20 Hz, whichever stretch of equal length comes first."""
+    time = np.arange(400) / 200.0
+    fast = np.where(time < 1.0, 0.0, 3.0)[:, None] * np.sin(2 * np.pi * 20.0 * time)[:, None]
+    slow = np.sin(2 * np.pi * time)[:, None] * [1.0, 0.5, 0.2]
+    readings = SimpleNamespace(
+        run=np.arange(400) // 200, keep=np.ones((400, 4, 6), bool), sd=np.full((4, 2), 1e-3)
+    )
+    there, not_there = (gain_error(readings, slow + part, 9, 4) for part in (fast, 0.0))
+    assert abs(not_there) < 1e-3 and there < -0.05
+    assert gain_error(readings, (slow + fast)[::-1], 9, 4) == pytest.approx(there, rel=0.1)
+
+
+def test_a_slope_of_fast_motion_is_of_a_shorter_window():
+    """At 400 Hz omega_dot of 25 Hz is known to a fifth by no longer window than half."""
+    recording, _ = imuarray.simulate(
+        sub_array(imuarray.mimu4444(), 4), 4.0, 400.0, seed=2, bandwidth=25.0
+    )
+    readings = arrange(recording)
+    state = start(readings, columns_of(readings.array, (), np.inf))
+    found = turned(readings, state).turning
+    whole = _slope_prior(readings, state.motion[:, :3], readings.window)[1]
+    assert np.median(found.sd) < 0.2 * np.std(found.mean) < np.median(whole)
+
+
+def test_tails_that_come_and_go_are_held():
+    """Late in a search, the largest degrees of freedom among those that recur; else the last."""
+    first = [np.array([4.0, 4.0])] * SETTINGS.tails_late
+    restless = [np.array([nu, 50.0]) for nu in (3.0, 20.0, 3.0, 20.0, 3.0)]
+    assert list(steady(first[:5] + restless[:3])) == [3.0, 50.0]
+    assert list(steady(first + restless)) == [20.0, 50.0]
+    assert list(steady(first + restless[:1] * 5)) == [3.0, 50.0]
+    assert list(steady([*first, *[np.array([10.0, np.inf])] * 5])) == [10.0, np.inf]
 
 
 def test_estimates_of_one_truth_differ_by_chi_square():

@@ -58,6 +58,8 @@ def run_procedure(
     InputError where a recording has too few moving samples.
     """
     raw, reading_faults, whole, corrected = prepared(recording, without)
+    if whole.pair:  # what it is held against, the rates' change, is alike from sample to sample
+        without = (*without, COLOURED)
     most = SETTINGS.searched // max(len(whole.labels) // SETTINGS.large, 1)
     raw, readings = part_of(raw, most), part_of(whole, most)
     no_effects = columns_of(readings.array, (), readings.position_prior_sd)

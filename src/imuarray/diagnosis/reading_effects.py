@@ -44,12 +44,11 @@ def find_repeats(readings: Readings):
     lost = np.zeros(readings.values.shape, bool)
     hit, shares, logs = [], [], []
     for imu, kind in np.argwhere(readings.exists):
-        values = part(readings, kind)[:, imu]
-        same = (values[1:] == values[:-1]) & together[:, None]
+        values = _as_read(readings, imu, kind)
+        close = np.abs(np.diff(values, axis=0)) <= SETTINGS.equal * (1 + np.abs(values[1:]))
+        same = close & together[:, None]
         every = same.all(axis=1)
-        chance = np.prod(same.mean(axis=0)) if not every.all() else 1.0
-        alone = np.prod((same & ~every[:, None]).mean(axis=0))
-        log_p = log_poisson(every.sum(), max(min(chance, alone), 1e-9) * together.sum())
+        log_p = log_poisson(every.sum(), max(_by_chance(same, every), 1e-9 * together.sum()))
         if every.sum() >= SETTINGS.least_repeats and log_p < SETTINGS.rare_repeats:
             # after a gap, the sample before is not at hand
             lost[1:, imu, 3 * kind : 3 * kind + 3] = (every | ~together)[:, None]
@@ -65,6 +64,21 @@ def find_repeats(readings: Readings):
         "stale_samples", tuple(sorted({*hit})), float(min(logs)), numbers, says, doubtful=True
     )
     return [found], lost
+
+
+def _as_read(readings: Readings, imu: int, kind: int) -> np.ndarray:
+    """Readings (T, 3) of a triad without first order's map, which mixes its axes' steps."""
+    values, left = part(readings, kind)[:, imu], readings.left
+    removed = [] if left is None or left.removed is None else left.removed.reshape(-1, 3, 3)
+    place = kind * readings.array.accelerometers + imu
+    return values @ np.linalg.inv(removed[place]).T if place < len(removed) else values
+
+
+def _by_chance(same, every) -> float:
+    """How many samples repeat all axes where axes (T, 3) repeat by themselves: slow ones do."""
+    few = same & ~every[:, None]
+    blocks = np.array_split(few, max(len(few) // SETTINGS.repeats_block, 1))
+    return float(sum(len(block) * np.prod(block.mean(axis=0)) for block in blocks))
 
 
 def find_rails(readings: Readings):

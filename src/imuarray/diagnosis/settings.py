@@ -26,6 +26,8 @@ class Settings:
     # Readings (`reading_effects`, `final_checks`, `procedure`)
     searched: int = 4096  # samples; of longer recordings, stretches spread over all of it
     large: int = 32  # IMUs; of more, so many samples less
+    equal: float = 1e-9  # m/s^2 or rad/s, relative above 1: rounding of maps put back
+    repeats_block: int = 64  # samples in which axes repeat alike often by chance
     least_repeats: int = 1  # samples that a triad repeats
     least_clipped: int = 3  # readings at one value that make a rail
     rare_repeats: float = -12.0  # log p from which repeats are no chance of a coarse converter
@@ -81,6 +83,7 @@ class Settings:
     delayed: float = 0.1  # log ratio of noise that a delay of a prior sd may bring with it
     least_share: float = 1e-9  # share of the largest information below which there is none
     # Shocks (`shocks`)
+    least_rest: float = 1.0  # degrees of freedom of a sample without its worst IMU
     least_shaken: int = 4  # IMUs; with one of fewer left out, too little is there to agree
     shaken: float = 1e-7  # chance of a sample of plain noise to be called shaken
     ringing: float = 1e-2  # the same beside a shaken sample

@@ -25,6 +25,7 @@ class Misfit(NamedTuple):
     least: np.ndarray  # with the IMU left out that misses most
     worst: np.ndarray  # that IMU
     freedom: np.ndarray  # of the whole
+    rest: np.ndarray  # degrees that are left without that IMU
 
 
 def misfits(fit: Fit) -> Misfit:
@@ -38,8 +39,9 @@ def misfits(fit: Fit) -> Misfit:
     least = whole - own.max(axis=1)
     kept = fit.readings.keep.sum(axis=2)
     freedom = np.sum(kept, axis=1) - np.sum(fit.basis**2, axis=(1, 2))
-    size = np.median(least / np.maximum(freedom - 6, 1))
-    return Misfit(whole / size, least / size, worst, freedom)
+    rest = freedom - np.take_along_axis(kept, worst[:, None], axis=1)[:, 0]
+    size = max(np.median(least / np.maximum(rest, 1)), 1e-300)
+    return Misfit(whole / size, least / size, worst, freedom, rest)
 
 
 def find_shocks(fit: Fit, limit: float) -> tuple[NoiseCause | None, np.ndarray]:
@@ -52,7 +54,9 @@ def find_shocks(fit: Fit, limit: float) -> tuple[NoiseCause | None, np.ndarray]:
     if fit.residual.shape[1] < SETTINGS.least_shaken:
         return None, none
     found = misfits(fit)
-    rest = np.maximum(found.freedom - 6, 1)
+    if np.median(found.rest) < SETTINGS.least_rest:  # the only gyroscope is not to be spared
+        return None, none
+    rest = np.maximum(found.rest, 1)
     shaken = found.least > special.chdtri(rest, SETTINGS.shaken)
     alone = ~shaken & (found.whole > special.chdtri(found.freedom, SETTINGS.shaken))
     jerk = np.linalg.norm(fit.state.jerk[1], axis=1)

@@ -165,7 +165,7 @@ def estimate(
     active = columns.movable(active, [one.state for one in recorded])
     places = places_of(columns, active, len(recorded))
     recorded = tuple(replace(one, resized=()) for one in recorded)
-    nu, length, last, moved = NORMAL, 1.0, None, []
+    nu, length, last, moved, tails = NORMAL, 1.0, None, [], []
     # from a former estimate: readings far out have little weight as it is
     weighted = all(one.readings.trust is not None for one in recorded)
     first = 0 if weighted else SETTINGS.robust_first
@@ -175,6 +175,8 @@ def estimate(
         if robust:
             pairs = zip(recorded, passes, strict=True)  # the least of all recordings' is all's
             nu = ROBUST if far else np.min([freedoms(x.readings, y) for x, y in pairs], axis=0)
+            tails.append(nu)
+            nu = steady(tails)
         noisy = _judged(recorded, passes, columns, active, nu)
         change = max(
             float(np.max(np.abs(new.readings.sd / old.readings.sd - 1)[old.readings.exists]))
@@ -207,6 +209,21 @@ def estimate(
         recorded, passes, columns, active, places, information, precision, blocks, nu,
         tuple(moved), bool(moved) and moved[-1] < SETTINGS.settled,
     )  # fmt: skip
+
+
+def steady(tails: list) -> np.ndarray:
+    """Degrees of freedom (2,) by their course (2,) each: the last, or the lightest that recur.
+
+    Where motion takes up most of the readings, weights change what stands out, and so the tails
+    that they follow from: of each kind that has gone up and down, late, the largest is kept.
+    """
+    late = np.array(tails[SETTINGS.robust_first :][-SETTINGS.tails_seen :])
+    if len(tails) < SETTINGS.tails_late:
+        return tails[-1]
+    with np.errstate(invalid="ignore"):  # infinite ones stay
+        steps = np.nan_to_num(np.diff(late, axis=0))
+    restless = (steps > 0).any(axis=0) & (steps < 0).any(axis=0)
+    return np.where(restless, late.max(axis=0), tails[-1])
 
 
 def places_of(columns: Columns, active, recordings: int) -> tuple[np.ndarray, ...]:

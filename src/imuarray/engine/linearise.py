@@ -259,12 +259,12 @@ THREADS = 2
 
 
 def linearise(
-    readings: Readings, columns: Columns, state: State, wanted=None, spare=None
+    readings: Readings, columns: Columns, state: State, wanted=None, last=None
 ) -> Eliminated:
     """Residual and derivatives at a state, the motion eliminated.
 
     ``wanted`` : indices of the columns to differentiate by, all if None.
-    ``spare`` : a former answer whose memory may be used again. LinAlgError where the readings do
+    ``last`` : a former answer whose memory may be used again. LinAlgError where the readings do
     not determine the motion.
     """
     directions = np.arange(columns.size) if wanted is None else np.asarray(wanted, int)
@@ -272,7 +272,7 @@ def linearise(
     def one(start):
         return chunk_at(readings, columns, state, directions, start)
 
-    return Eliminated(*_joined(one, len(readings.values), spare))
+    return Eliminated(*_joined(one, len(readings.values), last))
 
 
 def relinearised(readings: Readings, columns: Columns, state: State, last: Eliminated):
@@ -390,12 +390,12 @@ def _motion(model, count, x, extra, time, span, positions, parameters, data):
     return jnp.einsum("tri,trj->tij", motion, motion), slope, jnp.sum(residual**2, axis=1)
 
 
-def _joined(one, samples, spare=None) -> list[np.ndarray]:
+def _joined(one, samples, last=None) -> list[np.ndarray]:
     """All chunks, one after the other, without the last one's padding."""
     first = one(0)
     shapes = [(samples, *part.shape[1:]) for part in first]
-    reused = spare is not None and [part.shape for part in spare] == shapes
-    out = list(spare) if reused else [np.empty(shape) for shape in shapes]
+    reused = last is not None and [part.shape for part in last] == shapes
+    out = list(last) if reused else [np.empty(shape) for shape in shapes]
 
     def put(start, found=None):
         for target, part in zip(out, one(start) if found is None else found, strict=True):

@@ -77,27 +77,27 @@ def uncorrelated(residual, basis, keep) -> np.ndarray:
     anything; ``keep`` (..., 3) bool.
     """
     out, factor = np.empty_like(residual), np.zeros((*residual.shape, 3))
-    linearised = keep.copy()
+    clean, free = keep.copy(), np.ones(residual.shape, bool)
     for i in range(3):  # Cholesky's factor and the forward substitution, all samples at once
         for j in range(i):
             known = np.sum(factor[..., i, :j] * factor[..., j, :j], axis=-1)
             known += np.einsum("...d,...d->...", basis[..., i, :], basis[..., j, :])
-            factor[..., i, j] = -known / factor[..., j, j]
+            factor[..., i, j] = np.where(free[..., j], -known / factor[..., j, j], 0.0)
         own = 1.0 - np.einsum("...d,...d->...", basis[..., i, :], basis[..., i, :])
         own -= np.sum(factor[..., i, :i] ** 2, axis=-1)
-        clear = own > SETTINGS.least_free
+        clear = free[..., i] = own > SETTINGS.least_free
         factor[..., i, i] = np.sqrt(np.where(clear, own, SETTINGS.least_free))
         absorbed = np.sum(factor[..., i, :i] * out[..., :i], axis=-1)
         out[..., i] = np.where(clear, residual[..., i] - absorbed, 0.0) / factor[..., i, i]
-        linearised[..., i] &= clear
-    return np.where(linearised, out, np.nan)
+        clean[..., i] &= clear
+    return np.where(clean, out, np.nan)
 
 
 def pick(projected, chosen) -> tuple[np.ndarray, np.ndarray]:
-    """The (imu, column) pairs (n, 2) of ``chosen`` (N, m) bool, and through's columns (T, D, n)."""
+    """The (imu, column) pairs (n, 2) of ``chosen`` (N, m) bool, and their columns (T, D, n)."""
     pairs = np.argwhere(chosen)
-    linearised = np.empty((len(projected), projected.shape[2], len(pairs)))
+    columns = np.empty((len(projected), projected.shape[2], len(pairs)))
     for imu in np.unique(pairs[:, 0]):
         own = np.flatnonzero(pairs[:, 0] == imu)
-        linearised[..., own] = projected[:, imu][..., pairs[own, 1]]
-    return pairs, linearised
+        columns[..., own] = projected[:, imu][..., pairs[own, 1]]
+    return pairs, columns

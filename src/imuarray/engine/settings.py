@@ -47,6 +47,8 @@ class Settings:
     group_steps: int = 6  # the same of the bare model, before groups of the sensor model are tried
     rung_again: int = 4  # the same while they are tried
     robust_first: int = 4  # of them with Student's t of 4, until readings far out are seen
+    tails_late: int = 12  # iterations after which degrees of freedom are to go up or down only
+    tails_seen: int = 5  # of them that are looked at
     alternating: float = 0.3  # of a step that the next one goes back: the valley is crossed
     settled: float = 0.05  # of a parameter's sd, a jackknife's where larger: shorter steps end it
     same_noise: float = 0.005  # relative change of a noise sd below which it is the same
@@ -125,6 +127,7 @@ class Settings:
     # `start`
     known_line: float = 0.01  # of the longest arm: accelerometers nearer to a line are on it
     clear_motion: float = 10.0  # times the noise's power, from which a frequency is motion
+    slope_windows: tuple[int, ...] = (1, 2, 4)  # parts of a derivative's window that are tried
     coherent_gain: float = 0.3  # sds of what a prior's samples say of one factor common to them all
     # `widths`
     map_nearly: float = 0.25  # of the largest distance of an IMU's map: as likely the one

@@ -25,13 +25,24 @@ from imuarray.motion.state import lever
 def turned(readings: Readings, state: State, follows: bool = False) -> State:
     """A state with the slope of its own rate as prior mean of omega_dot.
 
-    The slope is a local sextic's, a quartic's in runs too short for that. The prior's sd is the
-    gyroscopes' noise in it, and what a quartic leaves out, as the sextic shows it; in still shorter
-    runs all that is known is omega_dot's size. A polynomial makes fast motion too small in all
-    samples alike: the sd is so wide that this is no more than `coherent_gain` of what they say
-    together. ``follows``: as `TurningPrior` has it.
+    The slope is a local sextic's, a quartic's in runs too short for that, in a window as short as
+    the motion is fast: that of the least sd. ``follows``: as `TurningPrior` has it.
     """
-    rate, quartic = state.motion[:, :3], readings.window
+    whole = readings.window
+    windows = sorted({max(whole // part // 2 * 2 + 1, 5) for part in SETTINGS.slope_windows})
+    priors = [_slope_prior(readings, state.motion[:, :3], window) for window in windows]
+    slope, sd = min(priors, key=lambda prior: np.median(prior[1]))
+    return state._replace(turning=TurningPrior(slope, sd, np.full(len(sd), follows)))
+
+
+def _slope_prior(readings: Readings, rate, quartic: int) -> tuple[np.ndarray, np.ndarray]:
+    """(mean, sd) (T, 3) rad/s^2 of omega_dot by the slope of ``rate`` (T, 3) in a window.
+
+    The sd is the gyroscopes' noise in it, and what a quartic leaves out, as the sextic shows it; in
+    runs shorter than the window all that is known is omega_dot's size. A polynomial makes fast
+    motion too small in all samples alike: the sd is so wide that this is no more than
+    `coherent_gain` of what they say together.
+    """
     sextic = 3 * quartic // 4 * 2 + 1
     used = readings.keep[..., 3:] / np.square(readings.sd[:, 1])[:, None]
     noise = 1.0 / np.sqrt(np.maximum(used.sum(axis=1), used.max(initial=0.0)))
@@ -52,24 +63,27 @@ def turned(readings: Readings, state: State, follows: bool = False) -> State:
     )
     alone = spread == 0.0  # in runs that are too short: as large as elsewhere
     sd[alone] = np.sqrt(np.mean(short[~alone] ** 2)) if not alone.all() else np.inf
-    return state._replace(turning=TurningPrior(short, sd, np.full(len(sd), follows)))
+    return short, sd
 
 
 def gain_error(readings: Readings, rate, window, degree) -> float:
     """By how much of itself a local polynomial's slope of ``rate`` (T, 3) is too large, coherently.
 
-    From the rate's spectrum in the longest run, where it is above the gyroscopes' noise, and from
+    From the rate's spectrum in the longest runs, where it is above the gyroscopes' noise, and from
     the polynomial's frequency response.
     """
-    numbers, lengths = np.unique(readings.run, return_counts=True)
-    values = rate[readings.run == numbers[np.argmax(lengths)]]
-    if len(values) < window:
+    first, lengths = np.unique(readings.run, return_index=True, return_counts=True)[1:]
+    size = lengths.max()
+    if size < window:
         return 0.0
-    taper = np.hanning(len(values))[:, None]
-    power = np.sum(np.abs(np.fft.rfft(taper * (values - values.mean(axis=0)), axis=0)) ** 2, axis=1)
+    # of stretches of a long recording all: some are calm
+    values = rate[first[lengths == size, None] + np.arange(size)]
+    taper = np.hanning(size)[:, None]
+    values = taper * (values - values.mean(axis=1, keepdims=True))
+    power = np.mean(np.sum(np.abs(np.fft.rfft(values, axis=1)) ** 2, axis=2), axis=0)
     precision = np.sum(readings.keep[..., 3] / np.square(readings.sd[:, 1]), axis=1)
     power[power < SETTINGS.clear_motion * 3 * np.sum(taper**2) / np.median(precision)] = 0.0
-    turns = 2 * np.pi * np.fft.rfftfreq(len(values))  # rad a sample
+    turns = 2 * np.pi * np.fft.rfftfreq(size)  # rad a sample
     places = np.arange(window) - window // 2
     response = np.sin(np.outer(turns, places)) @ polynomial_taps(window, window // 2, 1, degree)
     squares = power * turns**2
