@@ -1,8 +1,9 @@
 """README's commands on simulated small boards (`board`), beside the truth.
 
 `python -m benchmarks.boards walk --boards 20` draws boards and runs convert, first-order and
-calibrate on each, and further commands by `--commands`; `mounts` does so at growing angles of
-the mounts, `mistakes` (`board_mistakes`) on logs that are wrong. From the project's root.
+calibrate on each, and further commands by `--commands`; `kinds` does so with boards of 2 to 16
+IMUs, 50 Hz to 1 kHz, slow and fast; `mounts` at growing angles of the mounts, `mistakes`
+(`board_mistakes`) on logs that are wrong. From the project's root.
 """
 
 from __future__ import annotations
@@ -84,7 +85,9 @@ def _diagnosed(folder: Path, board: Board) -> dict[str, float]:
     document = json.loads((folder / "diagnosis" / "diagnosis.json").read_text(encoding="utf-8"))
     found = document["extended"]
     positions, sds = (np.array(found[name]) for name in ("positions_m", "positions_sd_m"))
-    return grade(positions, sds, board.truth.positions) | {"unexplained": document["unexplained"]}
+    named = ",".join(cause["effect"] for cause in document["causes"]) or "nothing"
+    graded = grade(positions, sds, board.truth.positions)
+    return graded | {"named": named, "unexplained": document["unexplained"]}
 
 
 def _applied(folder: Path, board: Board) -> dict[str, float]:
@@ -163,6 +166,21 @@ def walks(
     return pd.DataFrame(rows).reindex(columns=_columns(rows))
 
 
+def draw_kind(seed: int, options: Options) -> Board:
+    """A clean board of any kind: IMUs, rate, motion, poses and mounts are drawn."""
+    rng = np.random.default_rng([seed, 60])
+    rate = float(rng.choice([50, 100, 200, 400, 500, 1000]))
+    kind = replace(
+        options, imus=int(rng.choice([2, 3, 4, 5, 6, 8, 12, 16])), sampling_rate=rate,
+        poses=int(rng.integers(12, 17)), still=rng.uniform(3.5, 5.0), move=rng.uniform(0.6, 2.0),
+        twisting=rng.uniform(18.0, 30.0), twist_dps=rng.uniform(300.0, 900.0),
+        bandwidth=min(float(rng.choice([2, 4, 8, 16])), rate / 16),
+        mount=float(rng.choice([0.3, 1.0, 2.0])),
+    )  # fmt: skip
+    print({k: v for k, v in vars(kind).items() if v != getattr(options, k)}, flush=True)
+    return draw_board(seed, kind)
+
+
 def _columns(rows) -> list[str]:
     """Those that there are, and the four of a position's grade in any case."""
     needed = ["error_um", "size_%", "within", "claimed_um"]
@@ -190,15 +208,16 @@ def parser(what, many: str, options=Options) -> argparse.ArgumentParser:
 
 def main() -> None:
     """Run what was asked for, and print."""
-    given = parser(["make", "walk", "mounts", "mistakes"], "boards").parse_args()
+    given = parser(["make", "walk", "kinds", "mounts", "mistakes"], "boards").parse_args()
     options = Options(**{item.name: getattr(given, item.name) for item in fields(Options)})
     seeds, commands = range(given.first, given.first + given.boards), given.commands.split(",")
     keep = None if given.out is None else given.out.resolve()
     if given.what == "make":
         for seed in seeds:
             draw_board(seed, options).write((keep or Path.cwd()) / f"board{seed}")
-    elif given.what == "walk":
-        found = walks(seeds, partial(draw_board, options=options), commands, keep, "board")
+    elif given.what in ("walk", "kinds"):
+        draw = draw_board if given.what == "walk" else draw_kind
+        found = walks(seeds, partial(draw, options=options), commands, keep, "board")
         print(summary(found).to_string())
     elif given.what == "mounts":
         for mount, turned in SWITCHES:

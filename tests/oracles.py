@@ -119,7 +119,7 @@ def joint_map(model, force, rate, saturated=None, prior=None, limit=40):
     Any model and noise; ``prior`` None or (mean, sd) of r_2 ... r_A. Steps that raise the cost are
     halved.
     """
-    split, D = 3 * (model.array.accelerometers - 1), model.motion_size
+    split, D = 3 * (model.array.accelerometers - 1), 9 + 6 * model.needs_derivatives
     whiten = [np.linalg.cholesky(np.linalg.inv(part)).T
               for part in (model.noise.accelerometer, model.noise.gyroscope)]  # fmt: skip
     keep = np.ones(rate.shape) if saturated is None else 1.0 - saturated

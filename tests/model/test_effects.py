@@ -23,7 +23,7 @@ RATE = np.radians(0.06)
 
 def packed(model, motion):
     """(T, 9 or 15)."""
-    return np.hstack([np.asarray(field) for field in motion[: model.motion_size // 3]])
+    return np.hstack([np.asarray(field) for field in motion[: 3 + 2 * model.needs_derivatives]])
 
 
 def simulated(effects, values, samples=120, seed=5):

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import multivariate_normal
 
-from imuarray.analysis.selection import select_dynamic
+from imuarray.analysis.selection import disjoint, select_dynamic
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.estimation.newton import calibrate_gauss_newton
@@ -72,14 +72,14 @@ def test_every_sample_is_kept_or_counted_once():
 
 def test_subsets_share_no_sample_and_span_the_recording():
     found = select_dynamic(twisting(np.random.default_rng(1)))
-    sets = found.disjoint([5, 50, 300])
+    sets = disjoint(found.informative, [5, 50, 300])
     together = np.concatenate(list(sets.values()))
     assert len(set(together.tolist())) == 355
     for count, index in sets.items():
         assert len(index) == count and np.all(np.diff(index) > 0)
         assert index[-1] - index[0] > 0.7 * (found.informative[-1] - found.informative[0])
     with pytest.raises(InputError, match="at least 100000 informative"):
-        found.disjoint([100_000])
+        disjoint(found.informative, [100_000])
 
 
 def test_a_recording_at_rest_has_nothing_to_select():

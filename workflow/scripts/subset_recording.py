@@ -5,7 +5,7 @@ from imuarray_papers.pipeline.job import job
 with job(snakemake) as settings:
     import pandas as pd
 
-    from imuarray.analysis.selection import select_dynamic
+    from imuarray.analysis.selection import disjoint, select_dynamic
     from imuarray.provenance import stamp, write_csv
     from imuarray.recording import read_recording, write_recording
     from imuarray.streams import stream
@@ -15,7 +15,7 @@ with job(snakemake) as settings:
     whole = read_recording(snakemake.input.recording)
     found = select_dynamic(whole)
     counts = settings["paper2021"]["samples"]
-    subsets = found.disjoint(counts)
+    subsets = disjoint(found.informative, counts)
     for samples, measured, simulated in zip(counts, made.measured, made.simulated, strict=True):
         subset = whole.select(subsets[samples])
         attrs = stamp(settings, seed) | {"samples": samples}

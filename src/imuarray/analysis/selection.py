@@ -28,20 +28,13 @@ class Selection:
     usable: np.ndarray
     removed: dict[str, int]
 
-    def disjoint(self, counts) -> dict[int, np.ndarray]:
-        """Disjoint subsets of ``counts`` samples each, spread evenly over the recording.
-
-        InputError where there are too few informative samples.
-        """
-        return disjoint(self.informative, counts)
-
     def spread(self, count: int | None) -> np.ndarray:
         """Indices of ``count`` informative samples, spread evenly; of all of them for None."""
-        return self.informative if count is None else self.disjoint([count])[count]
+        return self.informative if count is None else disjoint(self.informative, [count])[count]
 
 
 def disjoint(left: np.ndarray, counts) -> dict[int, np.ndarray]:
-    """Disjoint subsets of the samples ``left``, of ``counts`` each, the largest first.
+    """Disjoint subsets of the samples ``left``, of ``counts`` each, spread evenly over them.
 
     InputError where there are too few.
     """

@@ -217,13 +217,11 @@ def steady(tails: list) -> np.ndarray:
     Where motion takes up most of the readings, weights change what stands out, and so the tails
     that they follow from: of each kind that has gone up and down, late, the largest is kept.
     """
-    late = np.array(tails[SETTINGS.robust_first :][-SETTINGS.tails_seen :])
-    if len(tails) < SETTINGS.tails_late:
-        return tails[-1]
+    late = np.array(tails[-SETTINGS.tails_seen :])
     with np.errstate(invalid="ignore"):  # infinite ones stay
         steps = np.nan_to_num(np.diff(late, axis=0))
     restless = (steps > 0).any(axis=0) & (steps < 0).any(axis=0)
-    return np.where(restless, late.max(axis=0), tails[-1])
+    return np.where(restless & (len(tails) >= SETTINGS.tails_late), late.max(axis=0), tails[-1])
 
 
 def places_of(columns: Columns, active, recordings: int) -> tuple[np.ndarray, ...]:

@@ -21,7 +21,7 @@ from imuarray.engine.start import turned as with_slope
 from imuarray.geometry.array import positions_of, require_planar_extent
 from imuarray.model import ArrayModel
 from imuarray.model.array_model import clock
-from imuarray.motion import Motion, MotionEstimate
+from imuarray.motion.state import Motion, MotionEstimate
 
 COMPONENTS = tuple(f"{name}_{axis}" for name in ("omega", "omega_dot", "s") for axis in "xyz")
 

@@ -58,9 +58,8 @@ def _slope_prior(readings: Readings, rate, quartic: int) -> tuple[np.ndarray, np
     known = spread > 0.0
     together = np.sqrt(np.sum((short[known] / sd[known]) ** 2))
     window, degree = (sextic, 6) if long.any() else (quartic, 4)
-    sd *= max(
-        1.0, abs(gain_error(readings, rate, window, degree)) * together / SETTINGS.coherent_gain
-    )
+    coherent = abs(gain_error(readings, rate, window, degree)) * together
+    sd *= max(1.0, coherent / SETTINGS.coherent_gain)
     alone = spread == 0.0  # in runs that are too short: as large as elsewhere
     sd[alone] = np.sqrt(np.mean(short[~alone] ** 2)) if not alone.all() else np.inf
     return short, sd

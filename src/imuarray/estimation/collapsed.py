@@ -11,7 +11,7 @@ from imuarray.estimation import kernels
 from imuarray.estimation.rates import angular_rates
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel, structure_tensor
-from imuarray.motion import Motion, MotionEstimate
+from imuarray.motion.state import Motion, MotionEstimate
 
 TOLERANCE = 1e-10  # relative, of a step of omega from which a sample's search ends
 
@@ -216,17 +216,5 @@ def motion_from(data: Collapsed, positions, limit: int = 50) -> MotionEstimate:
 
 def motion_estimate(data: Collapsed, rate, state, cost, iterations) -> MotionEstimate:
     """From what the kernels found: omega (3, T), (w, phi) (12, T), cost and steps (T,)."""
-    motion = _motion_of(data, rate.T, state)
+    motion = Motion.of(rate.T, state[6:9].T, (state[9:12] + data.offset).T)
     return MotionEstimate(motion, cost, np.abs(iterations), iterations > 0)
-
-
-def motion_at(data: Collapsed, positions, rate) -> Motion:
-    """The most likely rest of the motion where omega is ``rate`` (T, 3) rad/s."""
-    found, _ = data.reduce(positions)
-    state = np.empty((12, data.samples))
-    kernels.linear_motion(np.array(np.asarray(rate).T, order="C"), found.X, found.phi, state)
-    return _motion_of(data, rate, state)
-
-
-def _motion_of(data: Collapsed, rate, state) -> Motion:
-    return Motion.of(rate, state[6:9].T, (state[9:12] + data.offset).T)

@@ -9,7 +9,7 @@ from imuarray.errors import IdentifiabilityError, InputError, require_shape
 from imuarray.estimation.collapsed import Collapsed, motion_from
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel
-from imuarray.motion import MotionEstimate
+from imuarray.motion.state import MotionEstimate
 
 
 @dataclass(frozen=True)

@@ -97,11 +97,6 @@ class ArrayModel:
         return np.concatenate([np.empty(0), *parts])
 
     @property
-    def motion_size(self) -> int:
-        """Unknowns of a sample's motion: 9, or 15 with omega double dot and s dot."""
-        return 15 if self.needs_derivatives else 9
-
-    @property
     def needs_derivatives(self) -> bool:
         """True where an effect looks at omega double dot and s dot."""
         return any(item.derivatives for item in self.chain)
