@@ -253,7 +253,7 @@ def causes_of(found: ProcedureResult, sds: np.ndarray) -> list[dict]:
     causes = []
     for item in found.reading_faults:
         nats = structural_gain(found, item)[:2]
-        if not item.doubtful or nats[0] > search.least_z * nats[1]:
+        if not item.doubtful or nats[0] > 0:
             causes.append(_entry(item, labels, item.parameters, nats, says=item.says))
     for cause in search.causes:
         statistic, freedom = need(search, cause.effect)
