@@ -79,8 +79,8 @@ def resumed(readings: Readings, columns: Columns, active, state: State) -> Estim
         np.sum(mask * values) / np.sum(mask)
         for item, mask in columns.gauges(active) if item.resizes and item.kinds == [1]
     ]  # fmt: skip
-    # pinned it would be some 1e-5: slopes have shown it
-    if recorded.smooth and np.any(np.abs(common) > SETTINGS.stiff / 10):
+    # pinned it would be some 1e-5: slopes have shown it; of a pair they are all there is
+    if recorded.smooth and (readings.pair or np.any(np.abs(common) > SETTINGS.stiff / 10)):
         recorded = replace(recorded, state=turned(recorded.readings, recorded.state, follows=True))
     imus = np.flatnonzero(active[:, columns.of(CLOCK)].any(axis=1))
     if imus.size:
