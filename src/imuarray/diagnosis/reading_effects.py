@@ -75,7 +75,7 @@ def _as_read(readings: Readings, imu: int, kind: int) -> np.ndarray:
 
 
 def _by_chance(same, every) -> float:
-    """How many samples repeat all axes where axes (T, 3) repeat by themselves: slow ones do."""
+    """Samples that repeat all axes (T, 3) by chance, as axes repeat by themselves: slow ones do."""
     few = same & ~every[:, None]
     blocks = np.array_split(few, max(len(few) // SETTINGS.repeats_block, 1))
     return float(sum(len(block) * np.prod(block.mean(axis=0)) for block in blocks))
