@@ -113,8 +113,7 @@ def sample(
     if fallen:
         tree.attrs["converged"] = 0
         notify("a chain went to where the triads lie on one line: the flat motion prior has no"
-            " bound there, and these triads are not far enough from it"
-            " (docs/findings.md)")  # fmt: skip
+            " bound there, and these are not far enough from it (docs/findings.md)")  # fmt: skip
     return tree
 
 

@@ -13,13 +13,7 @@ from imuarray.analysis import methods
 from imuarray.analysis.model import Notify, silent
 from imuarray.engine.dataset import engine_dataset, with_readings
 from imuarray.engine.estimate import Estimate
-from imuarray.engine.forward import (
-    EffectGroup,
-    groups_of,
-    resumed,
-    select_forward,
-    with_effects,
-)  # fmt: skip
+from imuarray.engine.forward import EffectGroup, groups_of, resumed, select_forward, with_effects
 from imuarray.engine.parameters import POSITION, columns_of, model_of
 from imuarray.engine.readings import Readings, arrange, determined, most_informative
 from imuarray.engine.start import start

@@ -171,9 +171,8 @@ def advance(columns, state, active, step, few, linearised: Eliminated, length) -
     blocks[few] = step
     along = np.einsum("tkim,km->tki", linearised.whitened, blocks, optimize=True)
     moved = (along.reshape(len(along), 1, -1) @ linearised.basis)[:, 0]
-    moved += np.einsum(
-        "tdi,tikm,km->td", linearised.expected, linearised.prior_slope, blocks, optimize=True
-    )
+    expected, slope = linearised.expected, linearised.prior_slope
+    moved += np.einsum("tdi,tikm,km->td", expected, slope, blocks, optimize=True)
     move = np.einsum("tji,tj->ti", linearised.inverse, linearised.absorbed - moved)
     return stepped(state._replace(motion=state.motion + move), columns, active, step)
 
@@ -181,11 +180,10 @@ def advance(columns, state, active, step, few, linearised: Eliminated, length) -
 def at(readings: Readings, columns: Columns, active, state: State, all_columns=True) -> Fit:
     """The fit's quantities at a state, with the derivative by every parameter or the active."""
     wanted = np.arange(columns.size) if all_columns else np.flatnonzero(active.any(axis=0))
-    linearised = linearise(readings, columns, state, wanted)
+    made = linearise(readings, columns, state, wanted)
     return Fit(
-        readings, columns, state, active, wanted, linearised.residual, linearised.whitened,
-        linearised.basis, linearised.expected, linearised.innovation, linearised.prior_slope,
-        linearised.log_volume, linearised.misfit,
+        readings, columns, state, active, wanted, made.residual, made.whitened, made.basis,
+        made.expected, made.innovation, made.prior_slope, made.log_volume, made.misfit,
     )  # fmt: skip
 
 

@@ -57,7 +57,7 @@ def run_procedure(
 
     InputError where a recording has too few moving samples.
     """
-    raw, reading_faults, whole, corrected = prepared(recording, without)
+    raw, faults, whole, corrected = prepared(recording, without)
     if whole.pair:  # what it is held against, the rates' change, is alike from sample to sample
         without = (*without, COLOURED)
     most = SETTINGS.searched // max(len(whole.labels) // SETTINGS.large, 1)
@@ -74,9 +74,7 @@ def run_procedure(
     if not corrected:
         checks = all_checks(search.fit, search.given, search.noise)
         search = replace(search, detectable=detectable(search))
-        return ProcedureResult(
-            search, base, scores, reading_faults, [], checks, 0.0, True, raw, whole
-        )
+        return ProcedureResult(search, base, scores, faults, [], checks, 0.0, True, raw, whole)
     before, search = search.fit, drop_outliers(search)
     first = first if search.fit is before else None
     del before  # it has derivatives of its own
@@ -109,7 +107,7 @@ def run_procedure(
     notify("looking for what cannot be distinguished")
     classes = {cause.effect: rivals(search, cause) for cause in search.causes}
     return ProcedureResult(
-        search, base, scores, together(reading_faults, clips), in_noise, checks, explained,
+        search, base, scores, together(faults, clips), in_noise, checks, explained,
         failing, raw, whole, classes,
     )  # fmt: skip
 

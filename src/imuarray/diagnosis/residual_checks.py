@@ -288,9 +288,8 @@ def resolution_check(fit: Fit) -> Check:
 def all_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]:
     """Everything that is tested of a residual."""
     # a prior of omega_dot from the rates' change is all that two accelerometers are held against
-    pair = fit.readings.pair
     return [
         *regression_checks(fit, given, noise), *size_checks(fit), *age_checks(fit),
-        *([] if pair else [correlation_check(fit, noise)]),
+        *([] if fit.readings.pair else [correlation_check(fit, noise)]),
         *noise_checks(noise, observable(fit.readings, fit.basis)), resolution_check(fit),
     ]  # fmt: skip

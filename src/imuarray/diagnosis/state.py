@@ -56,11 +56,9 @@ class ScoreAtFit:
         # fitted ones, too: put back to zero they are what the others are; refitted, nothing is left
         mask = residual_map_mask([made.readings.left], made.columns, False) & made.described
         if mask.any():
-            linearised = plain.information[:, plain.places(mask)]
+            cross = plain.information[:, plain.places(mask)]
             spread = spread_of(made.readings.left, made.columns, mask)
-            meat = (
-                plain.information if meat is None else meat
-            ) + linearised @ spread @ linearised.T
+            meat = (plain.information if meat is None else meat) + cross @ spread @ cross.T
         return plain if meat is None else replace(plain, meat=meat, correlation=self.correlation)
 
 

@@ -24,10 +24,8 @@ PHASES = np.arange(32) / 32  # of a turn, tried at first
 
 def delay_of(readings: Readings, columns: Columns, state: State) -> tuple[np.ndarray, np.ndarray]:
     """Each sample's score and information of each IMU's delay at a state, (T, N) each."""
-    linearised = linearise(readings, columns, state, columns.of(DELAY)[:1])
-    return delay_parts(
-        linearised.residual, linearised.whitened[..., 0], linearised.projected[..., 0]
-    )
+    made = linearise(readings, columns, state, columns.of(DELAY)[:1])
+    return delay_parts(made.residual, made.whitened[..., 0], made.projected[..., 0])
 
 
 def delay_parts(residual, along, projected) -> tuple[np.ndarray, np.ndarray]:

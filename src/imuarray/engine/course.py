@@ -22,16 +22,15 @@ def course(found: Estimate, moving) -> tuple[dict, dict]:
     over the declared noise around the instants ``stretch`` s; ``shaken`` (time), 1 where several
     IMUs are far off at once.
     """
-    readings, one_pass = found.recorded[0].readings, found.passes[0]
+    readings, sums = found.recorded[0].readings, found.passes[0]
     time = readings.time + readings.origin
-    far = distances(readings, one_pass)
+    far = distances(readings, sums)
     blocks = blocks_of(
         len(time), int(np.clip(len(time) // SETTINGS.course_samples, 1, SETTINGS.course_stretches))
     )
     squares = far * (readings.sd / readings.declared) ** 2
     rms = np.sqrt([
-        squares[part].sum(axis=0) / np.maximum(one_pass.number[part].sum(axis=0), 1)
-        for part in blocks
+        squares[part].sum(axis=0) / np.maximum(sums.number[part].sum(axis=0), 1) for part in blocks
     ])  # fmt: skip
     counts = readings.array.accelerometers, readings.array.gyroscopes
     variables: dict[str, tuple] = {
@@ -90,7 +89,7 @@ def changes(found: Estimate) -> tuple[tuple[float, float], tuple[int, float]]:
 def _changing(found: Estimate, places) -> tuple[np.ndarray, np.ndarray]:
     """(score (k,), information (k, k)) of a change of the parameters at ``places``."""
     share, along, whole = np.zeros(len(places)), 0.0, 0.0
-    counts = [len(one_pass.score) for one_pass in found.passes]
+    counts = [len(sums.score) for sums in found.passes]
     middle = np.concatenate([(np.arange(count) + 0.5) / count - 0.5 for count in counts])
     for when, (inner, slope) in zip(middle, found.blocks, strict=True):
         share += when * slope[places]

@@ -135,20 +135,18 @@ def _of_two(readings: Readings, model: ArrayModel, positions, effects, covarianc
     NaN where an axis has no gyroscope off its rail.
     """
     samples = len(readings.time)
-    linearised = np.flatnonzero(readings.keep[..., 3:].any(axis=1).all(axis=1))
-    part = readings.select(linearised)
+    used = np.flatnonzero(readings.keep[..., 3:].any(axis=1).all(axis=1))
+    part = readings.select(used)
     part = replace(part, gapless=_followed(part))
     state = start(part, columns_of(model.array, model.effects, np.inf))
     state = state._replace(positions=positions, parameters=np.asarray(effects))
     own, state = _in_turns(part, model, state)
     nowhere = np.full((samples, 9), np.nan)
     found = Motions(nowhere, np.zeros(samples, bool), np.zeros(samples, int), nowhere[:, 0].copy())
-    _put(found, linearised, own)
+    _put(found, used, own)
     spreads = np.full((2, samples, 9, 9), np.nan)
     # the parameters' share: the prior's mean moves with them
-    spreads[:, linearised] = covariances(
-        part, model, with_slope(part, state, follows=True), covariance
-    )
+    spreads[:, used] = covariances(part, model, with_slope(part, state, follows=True), covariance)
     return Fused(_estimate(found), *spreads)
 
 

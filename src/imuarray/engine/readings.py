@@ -146,12 +146,10 @@ class Readings:
     def select(self, used) -> Self:
         """The samples in ``used`` (T,) bool, in new runs."""
         time = self.time[used]
-        trust, clock_deviation = (
-            None if p is None else p[used] for p in (self.trust, self.clock_deviation)
-        )
+        trust, turns = (None if p is None else p[used] for p in (self.trust, self.clock_deviation))
         return replace(
             self, time=time, values=self.values[used], keep=self.keep[used], run=runs(time),
-            trust=trust, clock_deviation=clock_deviation,
+            trust=trust, clock_deviation=turns,
         )  # fmt: skip
 
 

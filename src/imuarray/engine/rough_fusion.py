@@ -129,8 +129,8 @@ class Rough(NamedTuple):
         """(T, D, D) of the motion: noise as `fused` weighs it, and what the prior leaves."""
         out = []
         for first in range(0, len(self.state.motion), CHUNK):
-            one_pass = chunk_at(self.readings, self.columns, self.state, np.arange(0), first)
-            out.append(np.swapaxes(one_pass.inverse, 1, 2) @ one_pass.inverse)
+            made = chunk_at(self.readings, self.columns, self.state, np.arange(0), first)
+            out.append(np.swapaxes(made.inverse, 1, 2) @ made.inverse)
         return self.lost * np.concatenate(out)
 
     def covariances(self, spread) -> tuple[np.ndarray, np.ndarray]:

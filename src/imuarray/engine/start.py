@@ -28,8 +28,7 @@ def turned(readings: Readings, state: State, follows: bool = False) -> State:
     The slope is a local sextic's, a quartic's in runs too short for that, in a window as short as
     the motion is fast: that of the least sd. ``follows``: as `TurningPrior` has it.
     """
-    whole = readings.window
-    windows = sorted({max(whole // part // 2 * 2 + 1, 5) for part in SETTINGS.slope_windows})
+    windows = sorted({max(readings.window // n // 2 * 2 + 1, 5) for n in SETTINGS.slope_windows})
     priors = [_slope_prior(readings, state.motion[:, :3], window) for window in windows]
     slope, sd = min(priors, key=lambda prior: np.median(prior[1]))
     return state._replace(turning=TurningPrior(slope, sd, np.full(len(sd), follows)))

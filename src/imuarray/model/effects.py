@@ -62,9 +62,7 @@ class Instant(NamedTuple):
     gyroscopes: Turning | None = None  # as they see the motion, where that is free
     slow: Slow | None = None  # where the motion's course is smooth
     axes: object = None  # rotations from the accelerometers' own axes to the array's, (A, 3, 3)
-    clock_deviation: object = (
-        0.0  # turns by which the IMUs' clocks depart from a steady drift, (N,)
-    )
+    clock_deviation: object = 0.0  # turns by which clocks depart from a steady drift, (N,)
 
 
 @dataclass(frozen=True)
