@@ -62,6 +62,19 @@ def scaled_solve(information, right):
     return solution, np.sqrt(np.sum(vectors**2 / values, axis=1)) / scale
 
 
+def triangular_inverse(factor) -> np.ndarray:
+    """Inverse (..., n, n) of lower triangular matrices, row by row for all of them at once.
+
+    NumPy's takes them for full ones: four times as long.
+    """
+    out, diagonal = np.zeros_like(factor), 1 / np.diagonal(factor, axis1=-2, axis2=-1)
+    for i in range(factor.shape[-1]):
+        row = factor[..., i, None, :i] @ out[..., :i, :i]
+        out[..., i, :i] = -diagonal[..., i, None] * row[..., 0, :]
+        out[..., i, i] = diagonal[..., i]
+    return out
+
+
 def matrix_function(matrix, vector, function, tolerance: float = 1e-13) -> np.ndarray:
     """function(matrix) @ vector (n,) of a symmetric matrix (n, n), by Lanczos' method.
 

@@ -12,7 +12,8 @@ import imuarray
 from imuarray.engine.dataset import engine_dataset
 from imuarray.engine.estimate import (
     Recorded,
-    _passed,
+    _linearised,
+    _solvable,
     estimate,
     jackknifed,
     means,
@@ -25,7 +26,7 @@ from imuarray.engine.linearise import linearise, reading, relinearised
 from imuarray.engine.normal import uncorrelated
 from imuarray.engine.parameters import POSITION, columns_of, stepped
 from imuarray.engine.readings import arrange, most_informative, resolution
-from imuarray.engine.robust import normal_pass
+from imuarray.engine.robust import Linearised
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import _slope_prior, gain_error, start, turned
 from imuarray.engine.widths import (
@@ -75,7 +76,8 @@ def test_normal_equations_are_the_dense_ones():
     columns = columns_of(readings.array, EFFECTS, readings.position_prior_sd)
     active = columns.mask([POSITION, *EFFECTS])
     state = Recorded.of(readings, columns).state
-    seen = normal_pass(readings, columns, state, active, improved=2)
+    linear, residuals = Linearised.of(readings, columns, state, active, improved=3)
+    seen = linear.equations(active)
     model, pairs = columns.model, np.argwhere(active)
     base = columns.flat(state)
 
@@ -110,8 +112,7 @@ def test_normal_equations_are_the_dense_ones():
         information / np.outer(scale, scale), schur / np.outer(scale, scale), **close
     )
     np.testing.assert_allclose(score / scale, slope / scale, rtol=0, atol=1e-6)
-    freedom = seen.freedom.sum()
-    assert freedom == pytest.approx(readings.keep.sum() - cut)
+    assert residuals.freedom.sum() == pytest.approx(readings.keep.sum() - cut)
 
 
 def test_another_state_is_seen_by_the_derivatives_of_one_near_by():
@@ -243,7 +244,8 @@ def test_one_step_beside_the_maps_is_the_whole_problem():
     off = found.recorded, found.columns, found.active, found.places
     values[given] = found.values - means(*off)
     for _ in range(12):
-        now = replace(now, recorded=_passed(now.recorded, now.columns, active)[0])
+        linear, _ = _linearised(now.recorded, now.columns, active, 1)
+        now = replace(now, recorded=_solvable(now.recorded, linear, active)[0])
         blocks = at_more(now, active, [np.arange(len(given))]).blocks
         slope = sum(score for _, score in blocks) - prior @ values
         step = np.linalg.solve(sum(inner for inner, _ in blocks) + prior, slope)
@@ -335,9 +337,13 @@ def test_the_step_of_a_sensor_is_seen_behind_the_rounding_of_its_log(decimals):
 
 
 def test_steps_that_shrink_alike_are_gone_at_once():
-    """The sum of a geometric series; one where they do not shrink alike."""
-    steps = 0.02 * np.array([0.8, 0.6, 0.1, -0.7]) ** np.arange(3)[:, None]
-    np.testing.assert_allclose(to_come(*steps), [1 / (1 - 0.8), 1 / (1 - 0.6), 1, 1])
+    """The sum of a geometric series; one where they go back, turn or shrink more and more."""
+    way, other = np.array([2.0, -1.0, 0.5]), np.array([1.0, 2.0, 0.0])
+    for share, whole in ((0.8, 1 / (1 - 0.8)), (0.6, 1 / (1 - 0.6)), (0.99, 8.0), (-0.7, 1.0)):
+        assert to_come([way, share * way, share**2 * way]) == pytest.approx(whole)
+    assert to_come([way, 0.8 * way]) == to_come([way, 0.8 * way, 0.5 * way]) == 1.0
+    assert to_come([way, 0.8 * way, 0.6 * way + 0.2 * other]) == 1.0
+    assert to_come(np.zeros((3, 2))) == 1.0
 
 
 def test_recordings_of_a_board_are_fitted_jointly():

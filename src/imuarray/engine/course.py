@@ -7,7 +7,6 @@ from imuarray.engine.estimate import Estimate
 from imuarray.engine.heldout import Scores, blocks_of, log_densities, scores_of
 from imuarray.engine.linearise import linearise
 from imuarray.engine.parameters import POSITION
-from imuarray.engine.robust import distances
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.widths import growing
 from imuarray.linear import scaled_inverse
@@ -22,15 +21,14 @@ def course(found: Estimate, moving) -> tuple[dict, dict]:
     over the declared noise around the instants ``stretch`` s; ``shaken`` (time), 1 where several
     IMUs are far off at once.
     """
-    readings, sums = found.recorded[0].readings, found.passes[0]
+    readings, seen = found.recorded[0].readings, found.residuals[0]
     time = readings.time + readings.origin
-    far = distances(readings, sums)
     blocks = blocks_of(
         len(time), int(np.clip(len(time) // SETTINGS.course_samples, 1, SETTINGS.course_stretches))
     )
-    squares = far * (readings.sd / readings.declared) ** 2
+    squares = seen.distance * (readings.sd / readings.declared) ** 2
     rms = np.sqrt([
-        squares[part].sum(axis=0) / np.maximum(sums.number[part].sum(axis=0), 1) for part in blocks
+        squares[part].sum(axis=0) / np.maximum(seen.number[part].sum(axis=0), 1) for part in blocks
     ])  # fmt: skip
     counts = readings.array.accelerometers, readings.array.gyroscopes
     variables: dict[str, tuple] = {
@@ -39,7 +37,7 @@ def course(found: Estimate, moving) -> tuple[dict, dict]:
     }
     ends = [time[max(part.stop, 1) - 1] for part in blocks_of(len(time), len(found.blocks))]
     shaken = (
-        np.sum((far > chdtri(3, SETTINGS.course_shaken)).any(axis=2), axis=1)
+        np.sum((seen.distance > chdtri(3, SETTINGS.course_shaken)).any(axis=2), axis=1)
         >= SETTINGS.course_several
     )
     variables |= {
@@ -89,8 +87,8 @@ def changes(found: Estimate) -> tuple[tuple[float, float], tuple[int, float]]:
 def _changing(found: Estimate, places) -> tuple[np.ndarray, np.ndarray]:
     """(score (k,), information (k, k)) of a change of the parameters at ``places``."""
     share, along, whole = np.zeros(len(places)), 0.0, 0.0
-    counts = [len(sums.score) for sums in found.passes]
-    middle = np.concatenate([(np.arange(count) + 0.5) / count - 0.5 for count in counts])
+    each = (np.arange(SETTINGS.blocks) + 0.5) / SETTINGS.blocks - 0.5
+    middle = np.tile(each, len(found.recorded))
     for when, (inner, slope) in zip(middle, found.blocks, strict=True):
         share += when * slope[places]
         along = along + when * inner[:, places]

@@ -15,7 +15,15 @@ from imuarray.engine.alike import with_likely_spread
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, stepped
 from imuarray.engine.readings import Readings
-from imuarray.engine.robust import Pass, distances, freedoms, median_of, normal_pass, reweighted
+from imuarray.engine.robust import (
+    Equations,
+    Linearised,
+    Residuals,
+    freedoms,
+    median_of,
+    resized,
+    reweighted,
+)
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import is_smooth, start, with_derivatives, with_rough_prior
 from imuarray.linear import matrix_function, scaled_solve
@@ -31,8 +39,6 @@ class Recorded:
     readings: Readings
     state: State
     smooth: bool
-    # MacKay's last steps of the rough prior's log sds, (G,) each, since one went farther
-    resized: tuple[np.ndarray, ...] = ()
 
     @classmethod
     def of(cls, readings: Readings, columns: Columns, former: State | None = None) -> Self:
@@ -56,7 +62,7 @@ class Estimate:
 
     Attributes
     ----------
-    recorded, passes : of each recording, the last pass at its state
+    recorded, residuals : of each recording, where it stands and what it leaves there
     active : (N, m) bool, the parameters fitted
     places : for each recording, where its active parameters are among the n
     information, precision : (n, n) of the readings; of the priors, gauges pinned
@@ -66,7 +72,7 @@ class Estimate:
     """
 
     recorded: tuple[Recorded, ...]
-    passes: tuple[Pass, ...]
+    residuals: tuple[Residuals, ...]
     columns: Columns
     active: np.ndarray
     places: tuple[np.ndarray, ...]
@@ -97,10 +103,10 @@ class Estimate:
     def residual_ratio(self) -> float:
         """Rms residual over the declared noise, degrees of freedom allowed for."""
         squares, number = 0.0, 0.0
-        for one, one_pass in zip(self.recorded, self.passes, strict=True):
+        for one, seen in zip(self.recorded, self.residuals, strict=True):
             scale = (one.readings.sd / one.readings.declared) ** 2
-            squares += np.sum(distances(one.readings, one_pass) * scale)
-            number += one_pass.number.sum()
+            squares += np.sum(seen.distance * scale)
+            number += seen.number.sum()
         return float(np.sqrt(squares / number))
 
     def smooth_ratio(self) -> np.ndarray | None:
@@ -110,7 +116,7 @@ class Estimate:
         least jerk: what is faster than the samples is in the rest. None where motion is smooth.
         """
         parts = []
-        for one, one_pass in zip(self.recorded, self.passes, strict=True):
+        for one, seen in zip(self.recorded, self.residuals, strict=True):
             if one.state.rough_prior is None:
                 return None
             jerk = np.linalg.norm(one.state.jerk[1], axis=1)
@@ -118,7 +124,7 @@ class Estimate:
             turn = np.linalg.norm(one.state.motion[:, 3:6], axis=1)
             turning = turn > np.median(turn)
             smooth = turning & (jerk <= np.quantile(jerk[turning], SETTINGS.smooth_share))
-            far = distances(one.readings, one_pass) / median_of(one_pass.number)
+            far = seen.distance / median_of(seen.number)
             parts.append(far[smooth] * scale)
         return np.sqrt(np.median(np.concatenate(parts), axis=0))
 
@@ -164,49 +170,43 @@ def estimate(
     """
     active = columns.movable(active, [one.state for one in recorded])
     places = places_of(columns, active, len(recorded))
-    recorded = tuple(replace(one, resized=()) for one in recorded)
-    nu, length, last, moved, tails = NORMAL, 1.0, None, [], []
+    nu, length, moved, tails, trail = NORMAL, 1.0, [], [], []
     # from a former estimate: readings far out have little weight as it is
     weighted = all(one.readings.trust is not None for one in recorded)
     first = 0 if weighted else SETTINGS.robust_first
     for number in range(steps):
         far = number < first
-        recorded, passes = _passed(recorded, columns, active, int(far))
+        linear, seen = _linearised(recorded, columns, active, int(far))
         if robust:
-            pairs = zip(recorded, passes, strict=True)  # the least of all recordings' is all's
+            pairs = zip(linear, seen, strict=True)  # the least of all recordings' is all's
             nu = ROBUST if far else np.min([freedoms(x.readings, y) for x, y in pairs], axis=0)
             tails.append(nu)
             nu = steady(tails)
-        noisy = _judged(recorded, passes, columns, active, nu)
-        change = max(
-            float(np.max(np.abs(new.readings.sd / old.readings.sd - 1)[old.readings.exists]))
-            for old, new in zip(recorded, noisy, strict=True)
-        )
-        information, score, blocks = _summed(passes, places)
+        # before the equations: weights of a step before would halve the pace
+        recorded, seen, change = _judged(recorded, linear, seen, columns, active, nu)
+        recorded, equations = _solvable(recorded, linear, active)
+        information, score, blocks = _summed(equations, places)
         precision = pinned(columns, active, places, shown=shown(recorded))
-        if number == 0 and not weighted:  # what is far out is to have no say in the first step
-            recorded = noisy
-            continue
         values = _values(recorded, columns, active, places)
         columns = with_likely_spread(columns, active, values, information + precision, places[0])
         precision = pinned(columns, active, places, shown=shown(recorded))
         slope = score - precision @ (values - means(recorded, columns, active, places))
         step, sds = scaled_solve(information + precision, slope)
         sds = np.maximum(sds, jackknifed(information, precision, blocks))
+        trail = [*trail, step / sds]
+        length = paced(length, trail)
+        farther = 1.0 if far or length < 1.0 else to_come(trail)
         moved.append(float(np.max(np.abs(step) / sds, initial=0.0)))
-        if moved[-1] < SETTINGS.settled and change < SETTINGS.same_noise and number > first:
+        near = len(trail) > 1 and farther * moved[-1] < SETTINGS.settled
+        if near and change < SETTINGS.same_noise and number > first:
             break
-        # full steps may alternate across a valley: half of them lead into it
-        along = 0.0 if last is None else np.sum(step * last / sds**2)
-        back = along < 0 and -along > SETTINGS.alternating * np.sum((last / sds) ** 2)
-        length = max(length / 2, SETTINGS.shortest) if back else min(1.0, 1.5 * length)
-        last = step
         recorded = tuple(
-            replace(one, state=stepped(one.state, columns, active, length * step[place]))
-            for one, place in zip(noisy, places, strict=True)
+            replace(one, state=stepped(one.state, columns, active, farther * length * step[place]))
+            for one, place in zip(recorded, places, strict=True)
         )
+        trail = trail if farther == 1.0 else []
     return Estimate(
-        recorded, passes, columns, active, places, information, precision, blocks, nu,
+        recorded, seen, columns, active, places, information, precision, blocks, nu,
         tuple(moved), bool(moved) and moved[-1] < SETTINGS.settled,
     )  # fmt: skip
 
@@ -238,44 +238,50 @@ def places_of(columns: Columns, active, recordings: int) -> tuple[np.ndarray, ..
     return tuple(found)
 
 
-def _passed(recorded, columns, active, improved: int = 1):
-    """Each recording linearised, its motion improved."""
-    one_pass, moved = [], []
+def _linearised(recorded, columns, active, improved: int = 0):
+    """(linearised, what is left) of each recording."""
+    found = []
     for one in recorded:
         state = with_derivatives(one.readings, one.state, one.smooth)
-        one_pass.append(normal_pass(one.readings, columns, state, active, improved))
-        state = state._replace(motion=one_pass[-1].motion)
-        moved.append(_sized(replace(one, state=state), one_pass[-1].rough))
-    return tuple(moved), tuple(one_pass)
+        found.append(Linearised.of(one.readings, columns, state, active, improved))
+    linear, seen = zip(*found, strict=True)
+    return linear, seen
 
 
-def _sized(one: Recorded, rough) -> Recorded:
-    """The prior of rough motion as wide as is likeliest (MacKay's step), where readings tell.
+def _solvable(recorded, linear, active) -> tuple[tuple[Recorded, ...], tuple[Equations, ...]]:
+    """Each recording's normal equations at its noise, weights and prior; its motion improved."""
+    equations, moved = [], []
+    for one, at in zip(recorded, linear, strict=True):
+        equations.append(at.equations(active, one.readings, one.state.rough_prior))
+        state = at.state._replace(motion=equations[-1].motion, rough_prior=one.state.rough_prior)
+        moved.append(replace(one, state=state))
+    return tuple(moved), tuple(equations)
 
-    Where they tell little, steps are short and go on: three that shrink alike show how far.
+
+def paced(length: float, steps) -> float:
+    """Share of the last of the ``steps`` (n,) to be gone, after ``length`` of the one before.
+
+    Full steps may alternate across a valley: half of them lead into it.
     """
-    if one.state.rough_prior is None:
-        return one
-    determined = (rough[1] > SETTINGS.determined * len(one.state.motion)) & (rough[0] > 0)
-    step = np.log(np.where(determined, rough[0], 1.0) / np.where(determined, rough[1], 1.0)) / 2
-    made = (*one.resized, step)[-3:]
-    if len(made) == 3:
-        farther = to_come(*made)
-        step, made = farther * step, (() if np.any(farther > 1.0) else made)
-    most = np.log(SETTINGS.widening)
-    prior = one.state.rough_prior.scaled(np.exp(np.clip(step, -most, most)))
-    return replace(one, state=one.state._replace(rough_prior=prior), resized=made)
+    last, now = steps[-2:] if len(steps) > 1 else (0.0 * steps[-1], steps[-1])
+    back = -np.sum(now * last)
+    crossed = back > 0 and back > SETTINGS.alternating * np.sum(last**2)
+    return max(length / 2, SETTINGS.shortest) if crossed else min(1.0, 1.5 * length)
 
 
-def to_come(first, second, third) -> np.ndarray:
-    """All steps (G,) from the third on in units of it, where three shrink alike (Aitken), or 1."""
-    shares = np.array([
-        new / np.where(old == 0, np.inf, old) for old, new in ((first, second), (second, third))
-    ])  # fmt: skip
-    alike = np.all(np.abs(shares - SETTINGS.size_step) < SETTINGS.size_step_most, axis=0) & (
-        np.abs(third) < SETTINGS.size_near
-    )
-    return np.where(alike, 1.0 / np.clip(1.0 - shares[1], 1.0 / SETTINGS.farthest, 1.0), 1.0)
+def to_come(steps) -> float:
+    """All steps (n,) from the last one on in units of it, where three shrink alike (Aitken), or 1.
+
+    In sds: as all parameters count alike.
+    """
+    if len(steps) < 3 or not all(map(np.any, steps[-3:])):
+        return 1.0
+    first, second, third = steps[-3:]
+    before, now = first @ second / (first @ first), second @ third / (second @ second)
+    alike = now * np.linalg.norm(second) > (1 - SETTINGS.same_way) * np.linalg.norm(third)
+    if abs(now - before) > SETTINGS.same_pace or not alike:
+        return 1.0
+    return float(1.0 / np.clip(1.0 - now, 1.0 / SETTINGS.farthest, 1.0))
 
 
 def _size(places) -> int:
@@ -283,11 +289,11 @@ def _size(places) -> int:
     return 1 + max((int(place.max()) for place in places if len(place)), default=-1)
 
 
-def _summed(passes, places):
+def _summed(equations, places):
     """(information (n, n), score (n,), [(information, score)] of all blocks)."""
     size, blocks = _size(places), []
-    for one_pass, place in zip(passes, places, strict=True):
-        for inner, slope in zip(one_pass.information, one_pass.score, strict=True):
+    for one, place in zip(equations, places, strict=True):
+        for inner, slope in zip(one.information, one.score, strict=True):
             whole, score = np.zeros((size, size)), np.zeros(size)
             whole[np.ix_(place, place)], score[place] = inner, slope
             blocks.append((whole, score))
@@ -350,16 +356,23 @@ def _variance_of_mean(values, chosen) -> float:
     return float(max((np.var(x, ddof=1) / len(x) for x in some), default=0.0))
 
 
-def _judged(recorded, passes, columns, active, nu) -> tuple[Recorded, ...]:
-    """Noise and weights anew; a triad has paid for its share of the parameters."""
+def _judged(recorded, linear, seen, columns, active, nu):
+    """(recordings with noise, weights and priors anew, what is left in its sds, largest change).
+
+    A triad has paid for its share of the parameters.
+    """
     paid = np.zeros((len(active), 2))
     for column, name in enumerate(columns.names):
         kinds = EFFECTS[name].kinds if name in EFFECTS else [0]  # positions
         paid[:, kinds] += active[:, [column]] / len(kinds)
-    return tuple(
-        replace(one, readings=reweighted(one.readings, one_pass, paid / len(recorded), nu))
-        for one, one_pass in zip(recorded, passes, strict=True)
-    )
+    made, left, change = [], [], 0.0
+    for one, at, own in zip(recorded, linear, seen, strict=True):
+        readings = reweighted(one.readings, own, paid / len(recorded), nu)
+        ratio = np.abs(readings.sd / one.readings.sd - 1)[readings.exists]
+        change = max(change, float(np.max(ratio, initial=0.0)))
+        left.append(own.in_sds_of(readings, one.readings))
+        made.append(replace(one, readings=readings, state=resized(at.state, own)))
+    return tuple(made), tuple(left), change
 
 
 class Tested(NamedTuple):
@@ -386,8 +399,9 @@ def tested(found: Estimate, active, places=None) -> Tested:
     ``places`` of each recording's among all, by default those of `places_of`.
     """
     places = places or places_of(found.columns, active, len(found.recorded))
-    recorded, passes = _passed(found.recorded, found.columns, active)
+    linear, _ = _linearised(found.recorded, found.columns, active, 1)
+    recorded, equations = _solvable(found.recorded, linear, active)
     values = _values(recorded, found.columns, active, places)
     precision = pinned(found.columns, active, places, shown=shown(recorded))
     mean = means(recorded, found.columns, active, places)
-    return Tested(_summed(passes, places)[2], precision, mean, values, active, places)
+    return Tested(_summed(equations, places)[2], precision, mean, values, active, places)

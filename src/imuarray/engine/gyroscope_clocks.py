@@ -200,31 +200,30 @@ def _searched(residual, turn, turns, most, period, along, taken, together, reach
     """Coefficients (3,) of ``along`` with the least cost of their sum, within a reach of zero."""
     given = residual, turn, turns, most, period, along
     place = np.zeros(3)
-    best = _cost(*given, place, taken, together)
     for order in (1, 2, 1):
-        centre = place.copy()
+        trials = [place]
         for i, j in np.ndindex(9, 11):
-            trial = centre.copy()
-            trial[order] += reach * (i / 4 - 1)
-            trial[0] += reach * (j / 5 - 1)
-            found = _cost(*given, trial, taken, together)
-            if found < best:
-                best, place = found, trial
+            trials.append(place.copy())
+            trials[-1][order] += reach * (i / 4 - 1)
+            trials[-1][0] += reach * (j / 5 - 1)
+        place = trials[np.argmin(_costs(*given, np.array(trials), taken, together))]
     return place
 
 
-def _cost(residual, turn, turns, most, period, along, trial, taken, together) -> float:
-    """Sum of the sizes of what is left, none beyond what a wrong turn costs: outliers count little.
+def _costs(residual, turn, turns, most, period, along, trials, taken, together) -> np.ndarray:
+    """(n,) sums of what is left, none beyond what a wrong turn costs: outliers count little.
 
-    By clocks (K,) shifted along (T, 3); ``together``: an age common to all is the motion's then,
-    else ``taken`` (T,) is.
+    By clocks (K,) shifted along (T, 3) as each of the ``trials`` (n, 3): ``together``, an age
+    common to all is the motion's then, else ``taken`` (T,) is.
     """
-    shift = along @ trial
-    common = 0.5 + (shift if together else taken)
-    place = turns + shift[:, None]
-    age = period * (place - np.floor(place) - common[:, None])
-    off = np.abs(residual + age[..., None] * turn).sum(axis=2)
-    return float(np.minimum(off, most).sum())
+    found = np.zeros(len(trials))
+    for k in range(turns.shape[1]):
+        shift = trials @ along.T
+        place = turns[:, k] + shift
+        age = period[k] * (place - np.floor(place) - 0.5 - (shift if together else taken))
+        off = sum(np.abs(residual[:, k, i] + age * turn[:, k, i]) for i in range(3))
+        found += np.minimum(off, most[:, k]).sum(axis=1)
+    return found
 
 
 def with_phases(readings: Readings, state: State, clocks: dict) -> Readings:

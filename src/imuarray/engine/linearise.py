@@ -9,6 +9,7 @@ import numpy as np
 from imuarray.engine.derivatives import polynomial_derivative
 from imuarray.engine.parameters import POSITION, Columns
 from imuarray.engine.readings import Readings
+from imuarray.linear import triangular_inverse
 from imuarray.model import ArrayModel
 from imuarray.model.effects import Instant, Turning
 from imuarray.model.jax64 import jax, jnp
@@ -93,6 +94,22 @@ class State(NamedTuple):
         return self.motion[:, 9:12], self.motion[:, 12:15]
 
 
+class Whitened(NamedTuple):
+    """A chunk linearised at a state, in sds of its readings' noise."""
+
+    index: np.ndarray  # (T,) its samples
+    residual: np.ndarray  # (T, N, 6)
+    motion: np.ndarray  # (T, 6 N, D) derivatives by the motion
+    columns: np.ndarray  # (T, N, 6, m) of each IMU's readings by its own parameters
+
+    def reweighted(self, former: Readings, readings: Readings) -> Self:
+        """In the sds and weights of ``readings`` instead of the ``former`` ones."""
+        before, now = former.weights_of(self.index), readings.weights_of(self.index)
+        ratio = now / np.where(before > 0, before, 1.0)
+        motion = self.motion * ratio.reshape(len(ratio), -1, 1)
+        return Whitened(self.index, ratio * self.residual, motion, ratio[..., None] * self.columns)
+
+
 class Eliminated(NamedTuple):
     """A linearised recording, whitened, the motion eliminated sample by sample.
 
@@ -174,7 +191,7 @@ def _predicted(model, count, slopes, x, extra, time, span, positions, parameters
 
 @partial(jax.jit, static_argnums=(0, 1, 2))
 def _chunk(model, count, placed, x, extra, time, span, positions, parameters, data):
-    """Whitened residual, its derivatives by the motion and by all columns, the motion's gram.
+    """Whitened residual, its derivatives by the motion and by all columns.
 
     ``placed``: by the positions alone.
     """
@@ -196,8 +213,7 @@ def _chunk(model, count, placed, x, extra, time, span, positions, parameters, da
     predicted, motion, shared = jax.vmap(one)(x, extra, time)
     values, weights = data
     motion = (weights[..., None] * motion).reshape(len(x), 6 * count, -1)
-    gram = jnp.einsum("tri,trj->tij", motion, motion)
-    return weights * (values - predicted), motion, weights[..., None] * shared, gram
+    return weights * (values - predicted), motion, weights[..., None] * shared
 
 
 def _course(readings: Readings, index, whitened, sd) -> np.ndarray:
@@ -212,26 +228,6 @@ def _course(readings: Readings, index, whitened, sd) -> np.ndarray:
     run = readings.run[index]
     slope = polynomial_derivative(readings.time, run, share, readings.window, 1)
     return slope / sd[..., None, None]
-
-
-def _eliminated(residual, motion, whitened, gram, away, sd, prior_slope) -> Eliminated:
-    """A chunk, the motion projected out; ``away`` (T, k): of its prior, in sds.
-
-    A prior of the motion's last k numbers, ``sd`` infinite where it has none.
-    """
-    free = np.arange(gram.shape[1] - sd.shape[1], gram.shape[1])
-    gram[:, free, free] += sd**-2.0
-    factor = np.linalg.cholesky(gram)
-    inverse = np.linalg.inv(factor)
-    basis = motion @ np.swapaxes(inverse, 1, 2)
-    left, absorbed, innovation, misfit = _less_motion(residual, basis, inverse, away, sd)
-    volume = 2 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
-    first = prior_slope.shape[1]
-    expected = (inverse[:, :, free] / sd[:, None])[..., :first]
-    return Eliminated(
-        left, whitened, basis, inverse, absorbed, expected, innovation[:, :first], prior_slope,
-        volume, misfit,
-    )  # fmt: skip
 
 
 def _less_motion(residual, basis, inverse, away, sd):
@@ -302,23 +298,47 @@ def relinearised(readings: Readings, columns: Columns, state: State, last: Elimi
 
 def chunk_at(readings: Readings, columns: Columns, state: State, directions, start) -> Eliminated:
     """The `CHUNK` samples from ``start`` on, or as many as there are."""
+    return eliminated(readings, state, whitened_at(readings, columns, state, directions, start))
+
+
+def whitened_at(readings: Readings, columns: Columns, state: State, directions, start) -> Whitened:
+    """The samples of `chunk_at`, the motion not eliminated."""
     index, used = padded(start, len(readings.values)), slice(0, len(readings.values) - start)
-    x, extra, (mean, sd) = _rows_of(readings, state, index)
+    x, extra, _ = _rows_of(readings, state, index)
     placed = bool(np.all(directions < columns.of(POSITION).size)) or not columns.model.chain
     made = _chunk(
         columns.model, readings.values.shape[1], placed, x, extra, readings.time[index],
         readings.span, state.positions, state.parameters,
         (readings.values[index], readings.weights_of(index)),
     )  # fmt: skip
-    residual, motion, whitened, gram = (np.asarray(part)[used] for part in made)
-    index, x, mean, sd = (part[used] for part in (index, x, mean, sd))
+    residual, motion, whitened = (np.asarray(part)[used] for part in made)
+    return Whitened(index[used], residual, motion, whitened[..., directions])
+
+
+def eliminated(readings: Readings, state: State, chunk: Whitened) -> Eliminated:
+    """A chunk, the motion projected out: of the state that it is linearised at, but for its prior.
+
+    A prior of the motion's last k numbers, its sd infinite where it has none.
+    """
+    x, _, (mean, sd) = _rows_of(readings, state, chunk.index)
     away = (mean - x[:, x.shape[1] - sd.shape[1] :]) / sd
-    whitened = whitened[..., directions]
-    prior_slope = np.zeros((len(index), 0, whitened.shape[1], len(directions)))
+    prior_slope = np.zeros((len(x), 0, *chunk.columns[:, :, 0].shape[1:]))
     if state.turning is not None and state.turning.follows.any():
-        prior_slope = _course(readings, index, whitened, sd[:, :3])
+        prior_slope = _course(readings, chunk.index, chunk.columns, sd[:, :3])
+    free, first = np.arange(x.shape[1] - sd.shape[1], x.shape[1]), prior_slope.shape[1]
     # factorisations are LAPACK's, called from here (see `jax64`)
-    return _eliminated(residual, motion, whitened, gram.copy(), away, sd, prior_slope)
+    gram = chunk.motion.mT @ chunk.motion
+    gram[:, free, free] += sd**-2.0
+    factor = np.linalg.cholesky(gram)
+    inverse = triangular_inverse(factor)
+    basis = chunk.motion @ inverse.mT
+    left, absorbed, innovation, misfit = _less_motion(chunk.residual, basis, inverse, away, sd)
+    volume = 2 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+    expected = (inverse[:, :, free] / sd[:, None])[..., :first]
+    return Eliminated(
+        left, chunk.columns, basis, inverse, absorbed, expected, innovation[:, :first], prior_slope,
+        volume, misfit,
+    )  # fmt: skip
 
 
 def padded(start: int, samples: int) -> np.ndarray:

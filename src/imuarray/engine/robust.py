@@ -5,7 +5,7 @@ d^2: normal noise keeps weights near one, a reading far out loses its say.
 """
 
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -20,69 +20,109 @@ from imuarray.threads import one_thread
 FREEDOMS = np.array([3.0, 4.0, 6.0, 10.0, 20.0, 50.0, np.inf])
 
 
-class Pass(NamedTuple):
+class Residuals(NamedTuple):
+    """What a linearised recording leaves of each triad's readings, in sds of its noise.
+
+    The weights of a robust loss taken off.
+    """
+
+    squares: np.ndarray  # (T, N, 2) squared residuals
+    freedom: np.ndarray  # (T, N, 2) their expectation where noise is as assumed
+    distance: np.ndarray  # (T, N, 2) squares of what is uncorrelated and of unit variance in it,
+    number: np.ndarray  # (T, N, 2) and how many these are: three, less what the motion takes up
+    rough: np.ndarray  # (2, G) of what rough motion adds: squares in prior sds, and how many it saw
+
+    def in_sds_of(self, readings: Readings, former: Readings) -> Self:
+        """In other readings' sds instead of the ``former`` ones'."""
+        ratio = (former.sd / readings.sd) ** 2
+        return self._replace(squares=self.squares * ratio, distance=self.distance * ratio)
+
+
+class Equations(NamedTuple):
     """Normal equations of n parameters (N, m) bool, in blocks of time; whitened units."""
 
     information: np.ndarray  # (B, n, n)
     score: np.ndarray  # (B, n)
     motion: np.ndarray  # (T, D), improved
-    squares: np.ndarray  # (T, N, 2) squared residuals of each triad
-    freedom: np.ndarray  # (T, N, 2) their expectation where noise is as assumed
-    unit: np.ndarray  # (T, N, 2) squares of what is uncorrelated and of unit variance in it,
-    number: np.ndarray  # (T, N, 2) and how many these are: three, less what the motion takes up
-    rough: np.ndarray  # (2, G) of what rough motion adds: squares in prior sds, and how many it saw
 
 
-@one_thread()  # the chunks have one each
-def normal_pass(
-    readings: Readings, columns: Columns, state: linearise.State, active, improved: int = 1
-) -> Pass:
-    """The normal equations at a state, after ``improved`` Gauss-Newton steps of the motion.
+class Linearised(NamedTuple):
+    """A recording linearised at a state by its active parameters."""
 
-    Where that is none, the motion takes the step that they are linearised for: half the work, and
-    as good where it is small.
+    readings: Readings
+    state: linearise.State
+    chunks: list[linearise.Whitened]
 
-    LinAlgError where the readings do not determine the motion.
-    """
-    samples, count = readings.values.shape[:2]
-    wanted = np.flatnonzero(active.any(axis=0))
-    few = active[:, wanted]
-    blocks = blocks_of(samples)
-    motion = state.motion.copy()
-    squares, freedom, unit, number = (np.empty((samples, count, 2)) for _ in range(4))
-    triads = -1, count, 2, 3
+    @classmethod
+    @one_thread()  # the chunks have one each
+    def of(
+        cls, readings: Readings, columns: Columns, state: linearise.State, active, improved: int = 0
+    ) -> tuple[Self, Residuals]:
+        """After ``improved`` Gauss-Newton steps of the motion, and what it leaves of the readings.
 
-    def one(start):
-        part = slice(start, min(start + linearise.CHUNK, samples))
-        here = state._replace(motion=motion)
-        for _ in range(improved):
-            motion[part] += linearise.motion_step(readings, columns, here, start)
-        chunk = linearise.chunk_at(readings, columns, here, wanted, start)
-        residual, leverage = chunk.residual, linearise.leverage_of(chunk.basis)
-        left = np.where(readings.keep[part], 1.0 - leverage, 0.0)
-        squares[part], freedom[part] = by_triad(residual**2), by_triad(left)
-        own = uncorrelated(
-            residual.reshape(triads), chunk.basis.reshape(*triads, chunk.basis.shape[2]),
-            readings.keep[part].reshape(triads),
-        )  # fmt: skip
-        unit[part], number[part] = np.nansum(own**2, axis=-1), np.isfinite(own).sum(axis=-1)
-        if not improved:
-            step = np.swapaxes(chunk.inverse, 1, 2) @ chunk.absorbed[..., None]
-            motion[part] += step[..., 0]
-        rough = _seen_of_prior(here, motion[part], chunk.inverse, part)
-        known = [(block, *normal(chunk, few, rows)) for block, rows in _inside(blocks, part)]
-        return known, rough
+        LinAlgError where the readings do not determine the motion.
+        """
+        samples, count = readings.values.shape[:2]
+        wanted = np.flatnonzero(active.any(axis=0))
+        here = state._replace(motion=state.motion.copy())
+        squares, freedom, distance, number = (np.empty((samples, count, 2)) for _ in range(4))
+        triads = -1, count, 2, 3
 
-    with ThreadPoolExecutor(linearise.THREADS) as pool:
-        found = list(pool.map(one, range(0, samples, linearise.CHUNK)))
-    size = int(active.sum())
-    information, score = np.zeros((len(blocks), size, size)), np.zeros((len(blocks), size))
-    for block, inner, slope in (item for known, _ in found for item in known):
-        # in order, whichever thread was first
-        information[block] += inner
-        score[block] += slope
-    rough = sum(one for _, one in found)
-    return Pass(information, score, motion, squares, freedom, unit, number, rough)
+        def one(start):
+            part = slice(start, min(start + linearise.CHUNK, samples))
+            for _ in range(improved):
+                here.motion[part] += linearise.motion_step(readings, columns, here, start)
+            chunk = linearise.whitened_at(readings, columns, here, wanted, start)
+            made = linearise.eliminated(readings, here, chunk)
+            left = np.where(readings.keep[part], 1.0 - linearise.leverage_of(made.basis), 0.0)
+            squares[part], freedom[part] = by_triad(made.residual**2), by_triad(left)
+            own = uncorrelated(
+                made.residual.reshape(triads), made.basis.reshape(*triads, made.basis.shape[2]),
+                readings.keep[part].reshape(triads),
+            )  # fmt: skip
+            distance[part], number[part] = np.nansum(own**2, axis=-1), np.isfinite(own).sum(axis=-1)
+            motion = here.motion[part] + _motion_step(made)
+            return chunk, _seen_of_prior(here, motion, made.inverse, part)
+
+        with ThreadPoolExecutor(linearise.THREADS) as pool:
+            found = list(pool.map(one, range(0, samples, linearise.CHUNK)))
+        trust = 1.0 if readings.trust is None else readings.trust**2
+        chunks, rough = zip(*found, strict=True)
+        seen = Residuals(squares / trust, freedom, distance / trust, number, sum(rough))
+        return cls(readings, here, list(chunks)), seen
+
+    @one_thread()
+    def equations(self, active, readings: Readings | None = None, prior=None) -> Equations:
+        """The normal equations, and the motion by a step of its own.
+
+        ``readings``: with another noise or other weights; ``prior``: another of rough motion.
+        """
+        readings = self.readings if readings is None else readings
+        state = self.state if prior is None else self.state._replace(rough_prior=prior)
+        few, blocks = active[:, active.any(axis=0)], blocks_of(len(readings.values))
+        motion = state.motion.copy()
+
+        def one(chunk):
+            chunk = chunk.reweighted(self.readings, readings)
+            made = linearise.eliminated(readings, state, chunk)
+            part = slice(chunk.index[0], chunk.index[-1] + 1)
+            motion[part] += _motion_step(made)
+            return [(block, *normal(made, few, rows)) for block, rows in _inside(blocks, part)]
+
+        with ThreadPoolExecutor(linearise.THREADS) as pool:
+            found = list(pool.map(one, self.chunks))
+        size = int(active.sum())
+        information, score = np.zeros((len(blocks), size, size)), np.zeros((len(blocks), size))
+        for block, inner, slope in (item for known in found for item in known):
+            # in order, whichever thread was first
+            information[block] += inner
+            score[block] += slope
+        return Equations(information, score, motion)
+
+
+def _motion_step(made: linearise.Eliminated) -> np.ndarray:
+    """(T, D) to the motion that a chunk's readings have, all else as it is."""
+    return (made.inverse.mT @ made.absorbed[..., None])[..., 0]
 
 
 def _seen_of_prior(state: linearise.State, motion, inverse, part) -> np.ndarray:
@@ -109,22 +149,20 @@ def _inside(blocks, part: slice) -> list[tuple[int, slice]]:
     return found
 
 
-def reweighted(readings: Readings, one_pass: Pass, owned, former: np.ndarray) -> Readings:
-    """The readings with each triad's scale and weights as the residual of a pass shows them.
+def reweighted(readings: Readings, seen: Residuals, owned, former: np.ndarray) -> Readings:
+    """The readings with each triad's scale and weights as its residuals show them.
 
     ``owned`` (N, 2): parameters that a triad's readings have paid for. ``former`` (2,): degrees of
     freedom of t; infinite for normal noise.
     """
-    free = one_pass.freedom.sum(axis=0)
+    free = seen.freedom.sum(axis=0)
     free = np.maximum(free - owned, 0.1 * free)
-    trust = 1.0 if readings.trust is None else readings.trust
-    squares, distance = one_pass.squares / trust**2, distances(readings, one_pass)
-    ratio, weight, least = np.ones_like(free), np.ones_like(distance), least_ratio(readings)
+    ratio, weight, least = np.ones_like(free), np.ones_like(seen.distance), least_ratio(readings)
     for kind, nu in enumerate(former):
         own = readings.exists[:, kind] & (free[:, kind] > 0)
         if readings.exists[:, kind].sum() == 1:  # nothing to hold it against: as declared
             continue
-        d, n, s = (part[:, own, kind] for part in (distance, one_pass.number, squares))
+        d, n, s = (part[:, own, kind] for part in (seen.distance, seen.number, seen.squares))
         if not np.isfinite(nu):
             ratio[own, kind] = np.maximum(s.sum(axis=0) / free[own, kind], least[own, kind])
             continue
@@ -137,6 +175,17 @@ def reweighted(readings: Readings, one_pass: Pass, owned, former: np.ndarray) ->
     return readings.with_noise(sd, np.sqrt(weight) if np.isfinite(former).any() else None)
 
 
+def resized(state: linearise.State, seen: Residuals) -> linearise.State:
+    """The prior of rough motion as wide as is likeliest (MacKay's step), where readings tell."""
+    if state.rough_prior is None:
+        return state
+    squares, number = seen.rough
+    known = (number > SETTINGS.determined * len(state.motion)) & (squares > 0)
+    factor = np.sqrt(np.where(known, squares, 1.0) / np.where(known, number, 1.0))
+    factor = np.clip(factor, 1 / SETTINGS.widening, SETTINGS.widening)
+    return state._replace(rough_prior=state.rough_prior.scaled(factor))
+
+
 def least_ratio(readings: Readings) -> np.ndarray:
     """The least ratio (N, 2) of a triad's noise variance to that in use.
 
@@ -146,19 +195,14 @@ def least_ratio(readings: Readings) -> np.ndarray:
     return (np.maximum(steps, SETTINGS.least_scale * readings.declared) / readings.sd) ** 2
 
 
-def distances(readings: Readings, one_pass: Pass) -> np.ndarray:
-    """Squared residuals of each triad in its own sds, its weight taken off, (T, N, 2)."""
-    return one_pass.unit if readings.trust is None else one_pass.unit / readings.trust**2
-
-
-def freedoms(readings: Readings, one_pass: Pass) -> np.ndarray:
+def freedoms(readings: Readings, seen: Residuals) -> np.ndarray:
     """Degrees of freedom (2,) that make the triads' distances likeliest, of each kind of sensor."""
-    found, far = np.full(2, np.inf), distances(readings, one_pass)
-    determined = np.median(far / median_of(one_pass.number), axis=0) > least_ratio(readings)
+    found, far = np.full(2, np.inf), seen.distance
+    determined = np.median(far / median_of(seen.number), axis=0) > least_ratio(readings)
     for kind in range(2):
-        used = (one_pass.number[..., kind] > 0) & determined[:, kind]
+        used = (seen.number[..., kind] > 0) & determined[:, kind]
         if used.any() and readings.exists[:, kind].sum() > 1:  # one alone is normal, as declared
-            own = far[..., kind][used], one_pass.number[..., kind][used]
+            own = far[..., kind][used], seen.number[..., kind][used]
             found[kind] = FREEDOMS[np.argmax([_log_likelihood(*own, nu) for nu in FREEDOMS])]
     return found
 

@@ -18,7 +18,7 @@ from imuarray.engine.gyroscope_clocks import with_phases
 from imuarray.engine.linearise import CHUNK, State, chunk_at, predicted
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings
-from imuarray.engine.robust import distances, normal_pass
+from imuarray.engine.robust import Linearised
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import with_derivatives, with_free_gyroscopes, with_rough_prior
 from imuarray.model import ArrayModel
@@ -61,10 +61,10 @@ class Rough(NamedTuple):
                 now.readings, self.columns.model, now.state, every, self.rails, SETTINGS.rough_near
             )
             now = now._replace(state=now._moved(found.motion), converged=found.converged)
-            one_pass = normal_pass(now.readings, self.columns, now.state, nothing, improved=0)
+            _, seen = Linearised.of(now.readings, self.columns, now.state, nothing)
             last = number == SETTINGS.rough_rounds - 1
             least = SETTINGS.rough_freedom if last else 0.0
-            now = now._replace(readings=now._trusted(one_pass, least))
+            now = now._replace(readings=now._trusted(seen, least))
             if not last and now.readings.clock_deviation is not None:
                 other, doubt, _ = now.turns()
                 turns = now.readings.clock_deviation
@@ -81,24 +81,23 @@ class Rough(NamedTuple):
             prior = prior._replace(mean=mean)
         return self.state._replace(motion=motion, rough_prior=prior)
 
-    def _trusted(self, one_pass, least: float) -> Readings:
+    def _trusted(self, seen, least: float) -> Readings:
         """With the weights of Student's t, its scale each sample's own where that is larger.
 
         ``least``: degrees of freedom, if the estimate has fewer.
         """
-        readings, distance = self.readings, distances(self.readings, one_pass)
-        trust = np.ones(distance.shape)
+        trust = np.ones(seen.distance.shape)
         for kind, nu in enumerate(np.maximum(self.freedoms, least)):
             if not np.isfinite(nu):
                 continue
-            n, d, free = (part[..., kind] for part in (one_pass.number, distance, one_pass.freedom))
+            n, d, free = (part[..., kind] for part in (seen.number, seen.distance, seen.freedom))
             squares, whole = np.where(n > 0, d / np.maximum(n, 1), 0.0) * free, free.sum(axis=1)
             scale = np.ones((len(n), 1))
             for _ in range(SETTINGS.rough_rounds):
                 sums = np.sum((nu + n) / (nu + d / scale) * squares, axis=1)
                 scale = np.maximum(1.0, sums / np.maximum(whole, 1.0))[:, None]
             trust[..., kind] = np.sqrt((nu + n) / (nu + d / scale) / scale)
-        return readings.with_noise(readings.sd, trust)
+        return self.readings.with_noise(self.readings.sd, trust)
 
     def turns(self) -> tuple[Readings, np.ndarray, np.ndarray]:
         """Readings near a jump in the other turn; how likely that is (T, N); what it changes.

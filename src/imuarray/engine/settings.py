@@ -36,7 +36,6 @@ class Settings:
     offset: float = 1e-4  # s, of what they see of omega, for each of that
     determined: float = 0.03  # of these that readings must tell, for their sds to be estimated
     widening: float = 3.0  # factor by which an iteration may change such an sd
-    farthest: float = 8.0  # of MacKay's steps at once, where they go on alike
     least_size: float = 1e-3  # of a size that is estimated, times what such sensors have
     most_size: float = 30.0  # the same
     tied: float = 1e-5  # of that sd, as long as it is not free
@@ -50,6 +49,9 @@ class Settings:
     tails_late: int = 12  # iterations after which degrees of freedom are to go up or down only
     tails_seen: int = 5  # of them that are looked at
     alternating: float = 0.3  # of a step that the next one goes back: the valley is crossed
+    farthest: float = 8.0  # of a step at once, where they go on alike
+    same_pace: float = 0.1  # by which their shares of the one before may differ
+    same_way: float = 0.03  # of one, that may be across
     settled: float = 0.05  # of a parameter's sd, a jackknife's where larger: shorter steps end it
     same_noise: float = 0.005  # relative change of a noise sd below which it is the same
     dense: float = 0.5  # share of samples in gapless runs from which neighbours are looked at
@@ -79,9 +81,6 @@ class Settings:
     jump_jitter: float = 0.1  # turns; a reading farther off is of another turn, and tells no phase
     around_jump: float = 0.25  # turns from a clock's jump within which a reading's side is asked
     # Sizes that are estimated, and widths (`estimate`)
-    size_step: float = 0.85  # share of a size's step that the next one is, going on alike
-    size_step_most: float = 0.35  # farthest from it
-    size_near: float = 0.1  # log of a factor; longer steps are not yet those near the end
     smooth_share: float = 0.2  # share of rough samples that are looked at as the smooth ones
     spared: float = 1e-3  # least share of the information that blocks but one are taken to have
     # `forward`

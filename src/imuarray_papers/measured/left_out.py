@@ -21,7 +21,7 @@ from imuarray.engine.fusion import fuse
 from imuarray.engine.heldout import gain
 from imuarray.engine.parameters import POSITION, columns_of, stepped
 from imuarray.engine.readings import Readings
-from imuarray.engine.robust import normal_pass
+from imuarray.engine.robust import Linearised
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.widths import widened
 from imuarray.errors import InputError
@@ -124,7 +124,7 @@ def _positions(found: Estimate, calibration: xr.Dataset) -> tuple[np.ndarray, np
     nominal = columns.prior_means()[active]
     prior = np.diag(1.0 / np.broadcast_to(columns.prior_sd, active.shape)[active] ** 2)
     for _ in range(STEPS):
-        seen = normal_pass(one.readings, columns, one.state, active)
+        seen = Linearised.of(one.readings, columns, one.state, active, 1)[0].equations(active)
         state = one.state._replace(motion=seen.motion)
         information = seen.information.sum(axis=0) + prior
         off = columns.flat(state)[active] - nominal
@@ -144,7 +144,8 @@ def _sensors(found: Estimate, calibration: xr.Dataset) -> tuple[np.ndarray, np.n
     shared = [name for name in effects if not EFFECTS[name].own]
     every = columns.mask([POSITION, *shared])
     place, _ = places_among(replace(found, active=every, places=(np.arange(every.sum()),)), effects)
-    information = normal_pass(one.readings, columns, one.state, every).information.sum(axis=0)
+    linear, _ = Linearised.of(one.readings, columns, one.state, every, 1)
+    information = linear.equations(every).information.sum(axis=0)
     position = np.isin(np.array(columns.names)[np.nonzero(every)[1]], POSITION)
     whole = calibration["whole_covariance"].to_numpy()
     own = place[~position]
