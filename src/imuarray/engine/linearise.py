@@ -312,7 +312,9 @@ def whitened_at(readings: Readings, columns: Columns, state: State, directions, 
         (readings.values[index], readings.weights_of(index)),
     )  # fmt: skip
     residual, motion, whitened = (np.asarray(part)[used] for part in made)
-    return Whitened(index[used], residual, motion, whitened[..., directions])
+    if len(directions) < whitened.shape[-1]:
+        whitened = np.take(whitened, directions, axis=-1)
+    return Whitened(index[used], residual, motion, whitened)
 
 
 def eliminated(readings: Readings, state: State, chunk: Whitened) -> Eliminated:
