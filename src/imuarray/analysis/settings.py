@@ -30,9 +30,7 @@ class Settings:
     starts: int = 8  # of them
     rounds: int = 6  # of fit and noise by turns
     enough: float = 0.02  # change of all sds that ends them
-    freedom: float = (
-        200.0  # degrees that a triad's own noise takes, 5 % of its sd; else one for all
-    )
+    freedom: float = 200.0  # degrees for a triad's own noise, 5 % of its sd; else one for all
     apart: tuple[int, ...] = (4, 3)  # accelerometers, gyroscopes: of fewer the noise is one
     # `sampling`
     starts_apart: float = 2.0  # posterior sds by which the starts differ

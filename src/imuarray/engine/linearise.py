@@ -363,17 +363,6 @@ def _rows_of(readings: Readings, state: State, index):
     return state.motion[index], extra, prior
 
 
-def motion_step(readings: Readings, columns: Columns, state: State, start) -> np.ndarray:
-    """The Gauss-Newton step of the motion of the samples of `chunk_at`, (n, D).
-
-    The shared parameters as they are. LinAlgError where the readings do not determine it.
-    """
-    index = padded(start, len(readings.values))
-    gram, slope, _ = motion_equations(readings, columns.model, state, index)
-    step = np.linalg.solve(gram, slope[..., None])[..., 0]
-    return step[: len(readings.values) - start]
-
-
 def motion_equations(readings: Readings, model: ArrayModel, state: State, index, rails=None):
     """Normal equations of the motion of samples ``index``: (n, D, D), (n, D), costs (n,).
 
@@ -381,35 +370,21 @@ def motion_equations(readings: Readings, model: ArrayModel, state: State, index,
     readings that count as far as the prediction falls short of them.
     """
     x, extra, (mean, sd) = _rows_of(readings, state, index)
-    one_sided = None if rails is None else rails[index]
-    gram, slope, cost = map(np.array, _motion(
-        model, readings.values.shape[1], x, extra, readings.time[index], readings.span,
+    predicted, slopes = map(np.asarray, _predicted(
+        model, readings.values.shape[1], True, x, extra, readings.time[index], readings.span,
         state.positions, state.parameters,
-        (readings.values[index], readings.weights_of(index), one_sided),
     ))  # fmt: skip
+    values, weights = readings.values[index], readings.weights_of(index)
+    if rails is not None:
+        weights = weights + rails[index] * (np.sign(values) * (values - predicted) > 0)
+    motion = (weights[..., None] * slopes).reshape(len(x), -1, x.shape[1])
+    residual = (weights * (values - predicted)).reshape(len(x), -1, 1)
+    gram, slope = motion.mT @ motion, (motion.mT @ residual)[..., 0]
     free = np.arange(gram.shape[1] - sd.shape[1], gram.shape[1])
     gram[:, free, free] += sd**-2.0
     off = (mean - x[:, free]) / sd
     slope[:, free] += off / sd
-    return gram, slope, cost + np.sum(off**2, axis=1)
-
-
-@partial(jax.jit, static_argnums=(0, 1))
-def _motion(model, count, x, extra, time, span, positions, parameters, data):
-    def one(x, extra, time):
-        def flat(x):
-            return reading(model, count, x, positions, parameters, extra, time, span)
-
-        return _with_slopes(flat, x)
-
-    predicted, motion = jax.vmap(one)(x, extra, time)
-    values, weights, rails = data
-    if rails is not None:
-        weights = weights + rails * (jnp.sign(values) * (values - predicted) > 0)
-    motion = (weights[..., None] * motion).reshape(len(x), 6 * count, -1)
-    residual = (weights * (values - predicted)).reshape(len(x), -1)
-    slope = jnp.einsum("tri,tr->ti", motion, residual)
-    return jnp.einsum("tri,trj->tij", motion, motion), slope, jnp.sum(residual**2, axis=1)
+    return gram, slope, np.sum(residual**2, axis=(1, 2)) + np.sum(off**2, axis=1)
 
 
 def _joined(one, samples, last=None) -> list[np.ndarray]:

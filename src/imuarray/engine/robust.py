@@ -70,10 +70,10 @@ class Linearised(NamedTuple):
 
         def one(start):
             part = slice(start, min(start + linearise.CHUNK, samples))
-            for _ in range(improved):
-                here.motion[part] += linearise.motion_step(readings, columns, here, start)
-            chunk = linearise.whitened_at(readings, columns, here, wanted, start)
-            made = linearise.eliminated(readings, here, chunk)
+            for more in reversed(range(improved + 1)):
+                chunk = linearise.whitened_at(readings, columns, here, wanted, start)
+                made = linearise.eliminated(readings, here, chunk)
+                here.motion[part] += _motion_step(made) if more else 0.0
             left = np.where(readings.keep[part], 1.0 - linearise.leverage_of(made.basis), 0.0)
             squares[part], freedom[part] = by_triad(made.residual**2), by_triad(left)
             own = uncorrelated(

@@ -90,13 +90,9 @@ class Settings:
     least_difference: float = 0.03  # of the variance, by which two estimates may differ at least
     group_z: float = 2.0  # standard errors of a gain, from which a group is kept
     group_nats: float = 2.0  # nats, as well
-    steady_z: float = (
-        1.5  # the same, where smooth motion gains `steady_nats` without its best block
-    )
+    steady_z: float = 1.5  # the same, where smooth motion gains these without its best block:
     steady_nats: float = 10.0  # nats
-    known_slope: float = (
-        1e-2  # of the angular acceleration, to which slopes must know it for a curve
-    )
+    known_slope: float = 1e-2  # of angular acceleration, to which slopes know it for a curve
     curved_nats: float = 10.0  # of a curve: two seconds of clean motion had three by chance
     # `readings`
     same_maps: float = 0.05  # of their sds, from which maps are another calibration's
@@ -105,9 +101,7 @@ class Settings:
     off_step: float = 0.12  # of a step, off a multiple
     seldom: float = 0.05  # share that is chance
     # `robust`
-    least_free: float = (
-        1e-3  # of a reading's variance that the motion leaves, for its size to count
-    )
+    least_free: float = 1e-3  # of a reading's variance that motion leaves, for its size to count
     scale_rounds: int = 20  # of the scale that goes with each of them
     least_scale: float = 1e-4  # of the declared noise
     # `fusion`

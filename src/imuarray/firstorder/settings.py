@@ -34,9 +34,7 @@ class Settings:
     triad_close: float = 1e-8  # sds, a step that ends the search
     # `outliers`
     pose_outlier: float = 5.0  # times the median size of a residual
-    pose_shared: float = (
-        5.0  # times the median gain of leaving out a pose, without its worst triad's
-    )
+    pose_shared: float = 5.0  # times the median gain of leaving out a pose, its worst triad's not
     gravity_gone: float = 0.07  # of gravity: readings without it; those in g have a tenth
     gravity_off: float = 0.5  # relative, of a pose's mean specific force from gravity
     poses_left_out: float = 0.2  # of a triad's poses
