@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from imuarray.linear import matrix_function, scaled_eigh, scaled_inverse, scaled_square
+from imuarray.linear import (
+    matrix_function,
+    scaled_eigh,
+    scaled_inverse,
+    scaled_square,
+    triangular_inverse,
+)
 
 UNITS = np.array([1e-6, 1.0, 1e5, 30.0])
 
@@ -56,3 +62,10 @@ def test_a_function_of_a_matrix_is_that_of_its_eigenvalues(count, largest):
     found = matrix_function((axes * values) @ axes.T, vector, function)
     np.testing.assert_allclose(found, axes @ (function(values) * (axes.T @ vector)), rtol=1e-9)
     assert np.all(matrix_function(np.eye(count), np.zeros(count), function) == 0.0)
+
+
+@pytest.mark.parametrize("size", [0, 1, 9, 24])
+def test_triangular_inverses_are_those_of_full_matrices(size):
+    rng = np.random.default_rng(5)
+    factor = np.tril(rng.standard_normal((40, size, size))) + 3.0 * np.eye(size)
+    np.testing.assert_allclose(triangular_inverse(factor), np.linalg.inv(factor), atol=1e-12)

@@ -17,6 +17,7 @@ from imuarray.engine.estimate import (
     estimate,
     jackknifed,
     means,
+    paced,
     steady,
     to_come,
 )
@@ -344,6 +345,34 @@ def test_steps_that_shrink_alike_are_gone_at_once():
     assert to_come([way, 0.8 * way]) == to_come([way, 0.8 * way, 0.5 * way]) == 1.0
     assert to_come([way, 0.8 * way, 0.6 * way + 0.2 * other]) == 1.0
     assert to_come(np.zeros((3, 2))) == 1.0
+
+
+def test_half_steps_lead_into_a_valley_that_full_ones_cross():
+    """A search whose full steps overshoot by 1.9 ends; without a shorter length it would not."""
+    place, length, steps = 1.0, 1.0, []
+    for _ in range(20):
+        steps.append(np.array([-1.9 * place]))
+        length = paced(length, steps)
+        place += length * steps[-1][0]
+    assert abs(place) < 1e-3
+    assert paced(0.4, [np.ones(2), np.ones(2)]) == pytest.approx(0.6)
+    assert paced(1.0, [np.ones(2)]) == 1.0
+
+
+def test_a_search_ends_near_its_optimum(monkeypatch):
+    """Heavy tails, and scales that nobody models: where it would end at last is near in its sds."""
+    recording, _ = simulated(6.0, seed=4, effects=("accelerometer_scale",))
+    off = np.random.default_rng(3).standard_t(2, recording.specific_force.shape)
+    noise = arrange(recording).declared[:4, :1]
+    made = replace(recording, specific_force=recording.specific_force + noise * off)
+    found = widened(fitted(made))
+    assert found.converged and len(found.steps) < 30
+    slow = replace(SETTINGS, settled=1e-4, same_noise=1e-6)
+    monkeypatch.setattr(imuarray.engine.estimate, "SETTINGS", slow)
+    far = fitted(made, steps=200)
+    assert far.converged and len(far.steps) > len(found.steps)
+    left = (found.positions - far.positions)[1:] / position_sds(found)
+    assert np.abs(left).max() < 0.1
 
 
 def test_recordings_of_a_board_are_fitted_jointly():
