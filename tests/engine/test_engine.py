@@ -78,12 +78,12 @@ def test_normal_equations_are_the_dense_ones():
     active = columns.mask([POSITION, *EFFECTS])
     state = Recorded.of(readings, columns).state
     linear, residuals = Linearised.of(readings, columns, state, active, improved=3)
-    seen = linear.equations(active)
+    blocks, motion = linear.equations(active)
     model, pairs = columns.model, np.argwhere(active)
     base = columns.flat(state)
 
     def residual(unknowns):
-        motion, p = unknowns[: seen.motion.size].reshape(seen.motion.shape), unknowns[-len(pairs) :]
+        moved, p = unknowns[: motion.size].reshape(motion.shape), unknowns[-len(pairs) :]
         whole = jax.numpy.array(base).at[pairs[:, 0], pairs[:, 1]].set(p)
         values = [whole[:, columns.of(name)].ravel() for name in EFFECTS]
         values = {name: value for name, value in zip(EFFECTS, values, strict=True)}
@@ -94,11 +94,11 @@ def test_normal_equations_are_the_dense_ones():
             both = model.predict(at, whole[:, :3], flat)
             return jax.numpy.concatenate([both.specific_force, both.angular_rate], axis=1)
 
-        return (readings.weights * (readings.values - jax.vmap(one)(motion))).ravel()
+        return (readings.weights * (readings.values - jax.vmap(one)(moved))).ravel()
 
-    at = np.concatenate([seen.motion.ravel(), base[active]])
+    at = np.concatenate([motion.ravel(), base[active]])
     jacobian, left = np.asarray(jax.jacfwd(residual)(at)), np.asarray(residual(at))
-    cut = seen.motion.size
+    cut = motion.size
     inner, cross, outer = (
         jacobian[:, :cut].T @ jacobian[:, :cut], jacobian[:, :cut].T @ jacobian[:, cut:],
         jacobian[:, cut:].T @ jacobian[:, cut:],
@@ -107,7 +107,7 @@ def test_normal_equations_are_the_dense_ones():
     slope = -jacobian.T @ left
     slope = slope[cut:] - cross.T @ np.linalg.solve(inner, slope[:cut])
     scale = np.sqrt(np.diag(outer))
-    information, score = seen.information.sum(axis=0), seen.score.sum(axis=0)
+    information, score = sum(b[0] for b in blocks), sum(b[1] for b in blocks)
     close = {"rtol": 0, "atol": 1e-9}
     np.testing.assert_allclose(
         information / np.outer(scale, scale), schur / np.outer(scale, scale), **close

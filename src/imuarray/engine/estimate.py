@@ -16,7 +16,6 @@ from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, stepped
 from imuarray.engine.readings import Readings
 from imuarray.engine.robust import (
-    Equations,
     Linearised,
     Residuals,
     freedoms,
@@ -248,14 +247,15 @@ def _linearised(recorded, columns, active, improved: int = 0):
     return linear, seen
 
 
-def _solvable(recorded, linear, active) -> tuple[tuple[Recorded, ...], tuple[Equations, ...]]:
-    """Each recording's normal equations at its noise, weights and prior; its motion improved."""
+def _solvable(recorded, linear, active):
+    """(recordings with the motion improved, each one's normal equations in blocks of time)."""
     equations, moved = [], []
     for one, at in zip(recorded, linear, strict=True):
-        equations.append(at.equations(active, one.readings, one.state.rough_prior))
-        state = at.state._replace(motion=equations[-1].motion, rough_prior=one.state.rough_prior)
+        blocks, motion = at.equations(active, one.readings, one.state.rough_prior)
+        equations.append(blocks)
+        state = at.state._replace(motion=motion, rough_prior=one.state.rough_prior)
         moved.append(replace(one, state=state))
-    return tuple(moved), tuple(equations)
+    return tuple(moved), equations
 
 
 def paced(length: float, steps) -> float:
@@ -292,8 +292,8 @@ def _size(places) -> int:
 def _summed(equations, places):
     """(information (n, n), score (n,), [(information, score)] of all blocks)."""
     size, blocks = _size(places), []
-    for one, place in zip(equations, places, strict=True):
-        for inner, slope in zip(one.information, one.score, strict=True):
+    for own, place in zip(equations, places, strict=True):
+        for inner, slope in own:
             whole, score = np.zeros((size, size)), np.zeros(size)
             whole[np.ix_(place, place)], score[place] = inner, slope
             blocks.append((whole, score))

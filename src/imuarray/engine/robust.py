@@ -38,14 +38,6 @@ class Residuals(NamedTuple):
         return self._replace(squares=self.squares * ratio, distance=self.distance * ratio)
 
 
-class Equations(NamedTuple):
-    """Normal equations of n parameters (N, m) bool, in blocks of time; whitened units."""
-
-    information: np.ndarray  # (B, n, n)
-    score: np.ndarray  # (B, n)
-    motion: np.ndarray  # (T, D), improved
-
-
 class Linearised(NamedTuple):
     """A recording linearised at a state by its active parameters."""
 
@@ -92,15 +84,16 @@ class Linearised(NamedTuple):
         return cls(readings, here, list(chunks)), seen
 
     @one_thread()
-    def equations(self, active, readings: Readings | None = None, prior=None) -> Equations:
-        """The normal equations, and the motion by a step of its own.
+    def equations(self, active, readings: Readings | None = None, prior=None):
+        """([(information (n, n), score (n,))] of blocks of time, the motion after its own step).
 
-        ``readings``: with another noise or other weights; ``prior``: another of rough motion.
+        Normal equations of the n ``active`` (N, m) bool. ``readings``: with another noise or other
+        weights; ``prior``: another of rough motion.
         """
         readings = self.readings if readings is None else readings
         state = self.state if prior is None else self.state._replace(rough_prior=prior)
         few, blocks = active[:, active.any(axis=0)], blocks_of(len(readings.values))
-        motion = state.motion.copy()
+        motion, size = state.motion.copy(), int(active.sum())
 
         def one(chunk):
             chunk = chunk.reweighted(self.readings, readings)
@@ -111,13 +104,12 @@ class Linearised(NamedTuple):
 
         with ThreadPoolExecutor(linearise.THREADS) as pool:
             found = list(pool.map(one, self.chunks))
-        size = int(active.sum())
-        information, score = np.zeros((len(blocks), size, size)), np.zeros((len(blocks), size))
-        for block, inner, slope in (item for known in found for item in known):
+        sums = [(np.zeros((size, size)), np.zeros(size)) for _ in blocks]
+        for block, *both in (item for known in found for item in known):
             # in order, whichever thread was first
-            information[block] += inner
-            score[block] += slope
-        return Equations(information, score, motion)
+            for total, part in zip(sums[block], both, strict=True):
+                total += part
+        return sums, motion
 
 
 def _motion_step(made: linearise.Eliminated) -> np.ndarray:

@@ -124,11 +124,12 @@ def _positions(found: Estimate, calibration: xr.Dataset) -> tuple[np.ndarray, np
     nominal = columns.prior_means()[active]
     prior = np.diag(1.0 / np.broadcast_to(columns.prior_sd, active.shape)[active] ** 2)
     for _ in range(STEPS):
-        seen = Linearised.of(one.readings, columns, one.state, active, 1)[0].equations(active)
-        state = one.state._replace(motion=seen.motion)
-        information = seen.information.sum(axis=0) + prior
+        linear, _ = Linearised.of(one.readings, columns, one.state, active, 1)
+        blocks, motion = linear.equations(active)
+        state = one.state._replace(motion=motion)
+        information = sum(inner for inner, _ in blocks) + prior
         off = columns.flat(state)[active] - nominal
-        step = np.linalg.solve(information, seen.score.sum(axis=0) - prior @ off)
+        step = np.linalg.solve(information, sum(slope for _, slope in blocks) - prior @ off)
         one = replace(one, state=stepped(state, columns, active, step))
         if np.max(np.abs(step) * np.sqrt(np.diag(information))) < SETTLED:
             break
@@ -145,7 +146,7 @@ def _sensors(found: Estimate, calibration: xr.Dataset) -> tuple[np.ndarray, np.n
     every = columns.mask([POSITION, *shared])
     place, _ = places_among(replace(found, active=every, places=(np.arange(every.sum()),)), effects)
     linear, _ = Linearised.of(one.readings, columns, one.state, every, 1)
-    information = linear.equations(every).information.sum(axis=0)
+    information = sum(inner for inner, _ in linear.equations(every)[0])
     position = np.isin(np.array(columns.names)[np.nonzero(every)[1]], POSITION)
     whole = calibration["whole_covariance"].to_numpy()
     own = place[~position]
