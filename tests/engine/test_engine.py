@@ -79,6 +79,9 @@ def test_normal_equations_are_the_dense_ones():
     state = Recorded.of(readings, columns).state
     linear, residuals = Linearised.of(readings, columns, state, active, improved=3)
     blocks, motion = linear.equations(active)
+    again = Linearised.of(readings, columns, linear.state, active, held=False)[0]
+    for one, other in zip(blocks, again.equations(active)[0], strict=True):
+        np.testing.assert_allclose(one[0], other[0], rtol=1e-9, atol=1e-9 * np.abs(one[0]).max())
     model, pairs = columns.model, np.argwhere(active)
     base = columns.flat(state)
 

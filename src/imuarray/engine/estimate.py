@@ -169,7 +169,7 @@ def estimate(
     """
     active = columns.movable(active, [one.state for one in recorded])
     places = places_of(columns, active, len(recorded))
-    nu, length, moved, tails, trail = NORMAL, 1.0, [], [], []
+    nu, length, moved, tails, trail, near = NORMAL, 1.0, [], [], [], False
     # from a former estimate: readings far out have little weight as it is
     weighted = all(one.readings.trust is not None for one in recorded)
     first = 0 if weighted else SETTINGS.robust_first
@@ -206,7 +206,7 @@ def estimate(
         trail = trail if farther == 1.0 else []
     return Estimate(
         recorded, seen, columns, active, places, information, precision, blocks, nu,
-        tuple(moved), bool(moved) and moved[-1] < SETTINGS.settled,
+        tuple(moved), near,
     )  # fmt: skip
 
 
@@ -239,10 +239,10 @@ def places_of(columns: Columns, active, recordings: int) -> tuple[np.ndarray, ..
 
 def _linearised(recorded, columns, active, improved: int = 0):
     """(linearised, what is left) of each recording."""
-    found = []
+    found, held = [], sum(one.readings.keep.size // 6 for one in recorded) <= SETTINGS.held
     for one in recorded:
         state = with_derivatives(one.readings, one.state, one.smooth)
-        found.append(Linearised.of(one.readings, columns, state, active, improved))
+        found.append(Linearised.of(one.readings, columns, state, active, improved, held))
     linear, seen = zip(*found, strict=True)
     return linear, seen
 

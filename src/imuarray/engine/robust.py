@@ -42,16 +42,20 @@ class Linearised(NamedTuple):
     """A recording linearised at a state by its active parameters."""
 
     readings: Readings
+    columns: Columns
     state: linearise.State
-    chunks: list[linearise.Whitened]
+    wanted: np.ndarray  # of the columns, those that derivatives are by
+    chunks: list[linearise.Whitened | None]  # none that are not held: made again
 
     @classmethod
     @one_thread()  # the chunks have one each
     def of(
-        cls, readings: Readings, columns: Columns, state: linearise.State, active, improved: int = 0
-    ) -> tuple[Self, Residuals]:
+        cls, readings: Readings, columns: Columns, state: linearise.State, active,
+        improved: int = 0, held: bool = True,
+    ) -> tuple[Self, Residuals]:  # fmt: skip
         """After ``improved`` Gauss-Newton steps of the motion, and what it leaves of the readings.
 
+        ``held``: whether the derivatives stay in memory until the equations are made.
         LinAlgError where the readings do not determine the motion.
         """
         samples, count = readings.values.shape[:2]
@@ -74,14 +78,14 @@ class Linearised(NamedTuple):
             )  # fmt: skip
             distance[part], number[part] = np.nansum(own**2, axis=-1), np.isfinite(own).sum(axis=-1)
             motion = here.motion[part] + _motion_step(made)
-            return chunk, _seen_of_prior(here, motion, made.inverse, part)
+            return chunk if held else None, _seen_of_prior(here, motion, made.inverse, part)
 
         with ThreadPoolExecutor(linearise.THREADS) as pool:
             found = list(pool.map(one, range(0, samples, linearise.CHUNK)))
         trust = 1.0 if readings.trust is None else readings.trust**2
         chunks, rough = zip(*found, strict=True)
         seen = Residuals(squares / trust, freedom, distance / trust, number, sum(rough))
-        return cls(readings, here, list(chunks)), seen
+        return cls(readings, columns, here, wanted, list(chunks)), seen
 
     @one_thread()
     def equations(self, active, readings: Readings | None = None, prior=None):
@@ -95,7 +99,9 @@ class Linearised(NamedTuple):
         few, blocks = active[:, active.any(axis=0)], blocks_of(len(readings.values))
         motion, size = state.motion.copy(), int(active.sum())
 
-        def one(chunk):
+        def one(number):
+            given = self.readings, self.columns, self.state, self.wanted, number * linearise.CHUNK
+            chunk = self.chunks[number] or linearise.whitened_at(*given)
             chunk = chunk.reweighted(self.readings, readings)
             made = linearise.eliminated(readings, state, chunk)
             part = slice(chunk.index[0], chunk.index[-1] + 1)
@@ -103,7 +109,7 @@ class Linearised(NamedTuple):
             return [(block, *normal(made, few, rows)) for block, rows in _inside(blocks, part)]
 
         with ThreadPoolExecutor(linearise.THREADS) as pool:
-            found = list(pool.map(one, self.chunks))
+            found = list(pool.map(one, range(len(self.chunks))))
         sums = [(np.zeros((size, size)), np.zeros(size)) for _ in blocks]
         for block, *both in (item for known in found for item in known):
             # in order, whichever thread was first

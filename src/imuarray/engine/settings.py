@@ -42,6 +42,7 @@ class Settings:
     near: int = 9  # samples that give the size of the motion's third derivatives
     stiff: float = 1e-3  # of a parameter's prior sd: the sd that a pinned mean keeps
     # Robust estimation of several recordings (`estimate`)
+    held: int = 160000  # of IMUs, samples whose derivatives are in memory at once: half a GB
     iterations: int = 40  # Gauss-Newton steps at most
     group_steps: int = 6  # the same of the bare model, before groups of the sensor model are tried
     rung_again: int = 4  # the same while they are tried
