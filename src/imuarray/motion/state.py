@@ -78,13 +78,17 @@ def sphere_motion(rng, shape, angular_rate, angular_acceleration, specific_force
 
 
 def normal_motion(
-    rng, shape, angular_rate_sd, angular_acceleration_sd, specific_force_sd
-) -> Motion:
+    rng, shape, angular_rate_sd, angular_acceleration_sd, specific_force_sd, angular_jerk_sd=0.0,
+    force_rate_sd=0.0,
+) -> Motion:  # fmt: skip
     """Zero-mean normal motion, independent in time (paper 2021, section IV-A).
 
-    Standard deviations per axis in rad/s, rad/s^2, m/s^2.
+    Standard deviations per axis in rad/s, rad/s^2, m/s^2 (and rad/s^3, m/s^3 for the
+    derivatives that only delays see).
     """
-    sds = angular_rate_sd, angular_acceleration_sd, specific_force_sd, 0.0, 0.0
+    sds = (
+        angular_rate_sd, angular_acceleration_sd, specific_force_sd, angular_jerk_sd, force_rate_sd,
+    )  # fmt: skip
     return Motion(*(sd * rng.standard_normal((*shape, 3)) for sd in sds))
 
 
