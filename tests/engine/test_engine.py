@@ -351,10 +351,10 @@ def test_steps_that_shrink_alike_are_gone_at_once():
 
 
 def test_half_steps_lead_into_a_valley_that_full_ones_cross():
-    """A search whose full steps overshoot by 1.9 ends; without a shorter length it would not."""
+    """A search whose full steps are 2.5 times too long, and so lead farther and farther away."""
     place, length, steps = 1.0, 1.0, []
     for _ in range(20):
-        steps.append(np.array([-1.9 * place]))
+        steps.append(np.array([-2.5 * place]))
         length = paced(length, steps)
         place += length * steps[-1][0]
     assert abs(place) < 1e-3

@@ -15,14 +15,7 @@ from imuarray.engine.alike import with_likely_spread
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, stepped
 from imuarray.engine.readings import Readings
-from imuarray.engine.robust import (
-    Linearised,
-    Residuals,
-    freedoms,
-    median_of,
-    resized,
-    reweighted,
-)
+from imuarray.engine.robust import Linearised, Residuals, freedoms, median_of, resized, reweighted
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import is_smooth, start, with_derivatives, with_rough_prior
 from imuarray.linear import matrix_function, scaled_solve

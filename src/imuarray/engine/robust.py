@@ -21,10 +21,7 @@ FREEDOMS = np.array([3.0, 4.0, 6.0, 10.0, 20.0, 50.0, np.inf])
 
 
 class Residuals(NamedTuple):
-    """What a linearised recording leaves of each triad's readings, in sds of its noise.
-
-    The weights of a robust loss taken off.
-    """
+    """Residuals of each triad's readings in sds of its noise, a robust loss' weights taken off."""
 
     squares: np.ndarray  # (T, N, 2) squared residuals
     freedom: np.ndarray  # (T, N, 2) their expectation where noise is as assumed
