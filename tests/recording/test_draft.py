@@ -30,6 +30,8 @@ LONG = [
     *(f"IMU{k} {kind}{axis} [{unit}]" for k in (1, 2)
       for kind, unit in (("Acc", "g"), ("Gyr", "deg/s")) for axis in "XYZ"),
 ]  # fmt: skip
+MILLI = ["t", *(f"{kind}{axis}{k}[{unit}]" for k in (1, 2)
+                for kind, unit in (("A", "mg"), ("G", "mdps")) for axis in "xyz")]  # fmt: skip
 G, DEGREE = 9.80665, np.radians(1)
 DATES = [f"2026-03-01T12:00:{n // 100:02d}.{10 * (n % 100):03d}Z" for n in range(400)]
 
@@ -44,6 +46,10 @@ DATES = [f"2026-03-01T12:00:{n // 100:02d}.{10 * (n % 100):03d}Z" for n in range
     (["ts", *PLAIN[1:]], 1.0, 1.0, np.round(0.5 + np.arange(400) / 250, 6), {},
      ("m/s^2", "rad/s"), None, ("s", 250)),
     (PLAIN, 1e-3 * G, 1.0, DATES, {"sep": "\t"}, ("mg", "rad/s"), None, ("ns", 100)),
+    (["Zeit", *PLAIN[1:]], 1.0, 1.0, [f"01.03.2026 12:00:0{n / 100:.3f}" for n in range(400)],
+     {"sep": ";", "comma": True}, ("m/s^2", "rad/s"), None, ("ns", 100)),
+    (MILLI, 1e-3 * G, 1e-3 * DEGREE, range(0, 4000, 10), {"sep": "  "}, ("mg", "mdeg/s"), None,
+     ("ms", 100)),
 ])  # fmt: skip
 def test_a_draft_describes_its_table(
     names, force, rate, stamps, options, unit, scale, per_second, tmp_path
@@ -83,6 +89,7 @@ def loggers(names):
     ("imu[0].a{} imu[1].a{} imu[2].a{} imu[0].w{} imu[1].w{} imu[2].w{}", "0 1 2", "0 1 2"),
     ("pelvis_Acc_{} pelvis_Gyr_{} torso_Acc_{} torso_Gyr_{}", "pelvis torso", "pelvis torso"),
     ("mpu1A{} mpu2A{} mpu1G{} mpu2G{}", "1 2", "1 2"),
+    ("a{}_A g{}_A a{}_B g{}_B", "A B", "A B"),
     ("a_RS_S_{}_[m_s^-2] w_RS_S_{}_[rad_s^-1]", "1", "1"),
     ("Acc{}(g) As{}(deg/s) Angle{}(deg) H{}(uT)", "1", "1"),
     ("ACCEL_{}(10) ACCEL_{}(11) GYRO_{}(10) GYRO_{}(11)", "10 11", "10 11"),
@@ -130,14 +137,26 @@ def test_columns_without_a_header_go_by_their_place(tmp_path, head):
     np.testing.assert_array_equal(bare.to_numpy(), named.to_numpy())
 
 
-def test_tenths_of_milliseconds_by_the_name_of_who_counts_them(tmp_path):
-    text = table(PLAIN, 1.0, 1.0, range(0, 40000, 100)).replace("t,", "SampleTimeFine,", 1)
+@pytest.mark.parametrize("step, unit, rate", [(100, '"0.1 ms"', 100), (5000, "us", 200)])
+def test_sample_time_fine_is_in_what_its_maker_counts(tmp_path, step, unit, rate):
+    """Tenths of milliseconds in one series of theirs, microseconds in another."""
+    text = table(PLAIN, 1.0, 1.0, range(0, 400 * step, step)).replace("t,", "SampleTimeFine,", 1)
     (tmp_path / "log.csv").write_text(text)
     said, _ = draft([tmp_path / "log.csv"])
-    assert 'time: {column: SampleTimeFine, unit: "0.1 ms"}  # 100 samples a second' in said
+    assert f"time: {{column: SampleTimeFine, unit: {unit}}}  # {rate} samples a second" in said
     (tmp_path / "columns.yaml").write_text(said)
     time = read_layout(tmp_path / "columns.yaml")["time"]
-    assert stamps_of(load(tmp_path / "log.csv", {}, "")[0], time, "", "")[1] == pytest.approx(1e-4)
+    found = stamps_of(load(tmp_path / "log.csv", {}, "")[0], time, "", "")
+    assert found[1] == pytest.approx(1 / rate / step)
+
+
+def test_seconds_that_many_rows_share_are_no_stamps(tmp_path):
+    """Their nanoseconds are; noise and ranges have no exponent, which YAML would take for text."""
+    rows = [f"{n // 200},{n % 200 * 5_000_000}" for n in range(400)]
+    text = table(PLAIN, 1.0, 1e-4, rows).replace("t,", "secs,nsecs,", 1)
+    (tmp_path / "log.csv").write_text(text)
+    said, _ = draft([tmp_path / "log.csv"])
+    assert "time: {column: nsecs, unit: ns}  # 200 samples a second" in said and "e+" not in said
 
 
 @pytest.mark.parametrize("content", [

@@ -39,6 +39,8 @@ def stamped(stamps):
     [
         (text(table(ROWS), ";").replace(".", ","), "columns parted by ';', decimal commas"),
         (text(table(ROWS), "\t"), "columns parted by '\\t'"),
+        (text(table(ROWS), "   "), "columns parted by blanks"),
+        (text([*table(ROWS), table(ROWS)[-1][:4]])[:-1], "the last row is cut off: left out"),
         (text(table(ROWS)).encode("utf-16"), "encoding utf-16"),
         ("Logger 2.1\nSN 42, rev b\nRate;200 Hz\n" + text(table(ROWS)), "3 lines before"),
         (b"# \xb5g\n" + text(table(ROWS)).encode(), "encoding cp1252"),
@@ -64,12 +66,22 @@ def test_a_header_again_and_remarks_among_the_rows_are_left_out(tmp_path, plain)
     assert lines == left
 
 
-@pytest.mark.parametrize(
-    "form", ["2026-03-01T12:00:{:09.6f}Z", "2026-03-01 12:00:{:06.3f}", "12:00:{:06.3f}"]
-)
+@pytest.mark.parametrize("form", [
+    "2026-03-01T12:00:{:09.6f}Z", "2026-03-01 12:00:{:06.3f}", "12:00:{:06.3f}", "59:{:06.3f}",
+    "12:59:{:06.3f} AM", "3/13/2026 12:59:{:06.3f} PM", "13.03.2026 12:59:{:06.3f}",
+])  # fmt: skip
 def test_stamps_may_be_dates(tmp_path, plain, form):
     rows = stamped(form.format(0.001 * PERIOD * k) for k in range(ROWS))
     np.testing.assert_allclose(read(tmp_path, text(rows))[0].time, plain.time, atol=1e-9)
+
+
+@pytest.mark.parametrize("mark", [".", ":", ","])
+def test_times_of_day_go_on_past_midnight(tmp_path, plain, mark):
+    """Milliseconds may follow a colon or a comma."""
+    stamps = ((86400000 - 990 + PERIOD * k) % 86400000 for k in range(ROWS))
+    parts = ((s // 3600000, s // 60000 % 60, s // 1000 % 60, mark, s % 1000) for s in stamps)
+    rows = text(stamped("{:02d}:{:02d}:{:02d}{}{:03d}".format(*part) for part in parts), ";")
+    np.testing.assert_allclose(read(tmp_path, rows)[0].time, plain.time, atol=1e-9)
 
 
 def test_a_plain_table_needs_no_words(tmp_path):
@@ -105,12 +117,16 @@ def test_a_stamp_given_twice_is_put_midway_and_a_copied_row_left_out(tmp_path, p
     assert "1 rows are there twice" in lines[0]
 
 
-@pytest.mark.parametrize("bits", [16, 32])
-def test_a_counter_that_begins_anew_is_carried_on(tmp_path, plain, bits):
-    stamps = (2**bits - 990 + PERIOD * np.arange(ROWS)) % 2**bits
-    found, lines = read(tmp_path, text(stamped(stamps)))
+@pytest.mark.parametrize("size, step, words", [
+    (2**16, PERIOD, "16 bits"), (2**32, PERIOD, "32 bits"),
+    (10**9, 1_000_000 * PERIOD, "a second's nanoseconds"),
+])  # fmt: skip
+def test_a_counter_that_begins_anew_is_carried_on(tmp_path, plain, size, step, words):
+    stamps = (size - 99 * step + step * np.arange(ROWS)) % size
+    unit = {"time": {"column": "t", "unit": "ms" if step == PERIOD else "ns"}}
+    found, lines = read(tmp_path, text(stamped(stamps)), layout() | unit)
     np.testing.assert_allclose(found.time, plain.time)
-    assert f"a counter of {bits} bits" in lines[0]
+    assert f"a counter of {words} began anew" in lines[0]
 
 
 @pytest.mark.parametrize("every", [4, 10])

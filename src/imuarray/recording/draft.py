@@ -21,10 +21,10 @@ KINDS = {
     "accelerometers": r"^(a|acc.*|force|alpha)$",
     "gyroscopes": r"^(g|w|gyr.*|omega|ang.*|rate)$",
 }
-OF_UNIT = {"gyroscopes": r"(deg|rad|°|dps).*s", "accelerometers": r"^m?g$|^m.*s"}
+OF_UNIT = {"gyroscopes": r"(deg|rad|°).*s|dps", "accelerometers": r"^m?g$|^m.*s"}
 OTHERS = r"mag|grav|euler|quat|angle|orient"
 TIME = r"time|stamp|^t$|_t$|sec|millis|micros|^(ns|us|ms|s)$"
-FINE = "sampletimefine"  # as Xsens has it, in 0.1 ms
+FINE = "sampletimefine"  # as Xsens has it, in 0.1 ms, or us
 UNIT = r"[\[(]([^\[(]*[^\[(\d][^\[(]*)[\])]"  # in brackets; a number there is none
 AXES = (("[xX]", {"x": "yz", "X": "YZ"}), (r"(?<=\[)0(?=\])", {"0": "12"}))
 COUNTS = 2.0 ** np.arange(8, 17)  # of raw readings, in 1 g
@@ -32,10 +32,11 @@ RANGES = {
     "g": (2, 4, 8, 16, 24, 32, 64), "mg": (2000, 4000, 8000, 16000, 32000),
     "m/s^2": tuple(round(g * GRAVITY, 1) for g in (2, 4, 8, 16, 24, 32, 64)),
     "deg/s": (125, 250, 500, 1000, 2000, 4000),
+    "mdeg/s": tuple(1000 * r for r in (125, 250, 500, 1000, 2000, 4000)),
     "rad/s": tuple(round(float(np.radians(r)), 1) for r in (125, 250, 500, 1000, 2000, 4000)),
 }  # fmt: skip
 UNKNOWN = '"?"'
-WORDS = {"deg/s": "deg|dps|°", "rad/s": "rad"}
+WORDS = {"mdeg/s": "mdeg|mdps|m°", "deg/s": "deg|dps|°", "rad/s": "rad"}
 RAW = "scale", "noise", "range"  # not known of counts
 
 
@@ -121,7 +122,8 @@ def _read(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
     with expecting(path, "a CSV file with a header", (OSError, ValueError)):
         with open(path, encoding=written.encoding_of(path), errors="replace") as file:
             lines = [line.rstrip("\n") for line in islice(file, SETTINGS.head)]
-    width, number, sep = max(_header(lines, sep) for sep in written.DELIMITERS)
+    found = (_header(lines, sep) for sep in written.DELIMITERS)
+    width, number, sep = max(found, key=lambda one: one[0])
     if width < 0:
         number, sep = written.begin_of(lines)
         count = len(written.cells_of("".join(lines[number : number + 1]), sep))
@@ -135,8 +137,8 @@ def _read(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
 
 
 def _header(lines: list[str], sep: str) -> tuple[int, int, str]:
-    """(delimiters, number of the header, ``sep``) of the first words as wide as most lines."""
-    widths = [line.count(sep) for line in lines]
+    """(cells, number of the header, ``sep``) of the first words as wide as most lines."""
+    widths = [len(written.cells_of(line, sep)) for line in lines]
     most = int(np.median(widths or [0]))
     marks = "|".join(mark for mark, _ in AXES)
     words = [n for n, line in enumerate(lines) if widths[n] == most and re.search(marks, line)]
@@ -194,9 +196,9 @@ def _kind(plain: str, unit: str) -> str:
     if re.search(OTHERS, plain.lower()):
         return ""
     by_unit = next((kind for kind, text in OF_UNIT.items() if re.search(text, unit.lower())), "")
-    return by_unit or next(
-        (kind for kind, text in KINDS.items() if any(re.match(text, w.lower()) for w in words)), ""
-    )
+    words.sort(key=lambda word: len(word) == 1 and word.isupper())  # of IMU "A" the gyroscope: g_A
+    named = (kind for word in words for kind, text in KINDS.items() if re.match(text, word.lower()))
+    return by_unit or next(named, "")
 
 
 def _labels(names: list[str]) -> list[str]:
@@ -222,15 +224,17 @@ def _time(table: pd.DataFrame, given: dict[str, str]) -> tuple[str, float, list[
             steps, units = np.diff(nanoseconds), {"ns": 1e-9}
         else:
             fine = FINE in str(name).lower()
-            units = {u: size for u, size in UNITS["time"].items() if fine == (u == "0.1 ms")}
+            known = ("0.1 ms", "us") if fine else ("s", "ms", "us", "ns")
+            units = {unit: UNITS["time"][unit] for unit in known}
             steps = np.diff(values.to_numpy(float))
-        step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else np.nan
+        stamped = np.mean(steps > 0) > SETTINGS.draft_stamped if len(steps) else False
+        step = float(np.median(steps[steps > 0])) if stamped else np.nan
         hint = re.search(r"(?:\b|_)(ns|us|ms|s)(?:\b|_)", f"{name} {given.get(name)}".lower())
         likely = [
-            u
-            for u, size in units.items()
+            u for u, size in units.items()
             if SETTINGS.slowest <= 1 / (step * size) <= SETTINGS.fastest / 5
-        ]
+        ]  # fmt: skip
+        likely.sort(key=lambda u: abs(np.log(step * units[u] * SETTINGS.draft_rate)))
         likely = [u for u in likely if hint and u == hint[1]] or likely
         if likely:
             rate, unit = 1 / (step * units[likely[0]]), likely[0]
@@ -241,7 +245,12 @@ def _time(table: pd.DataFrame, given: dict[str, str]) -> tuple[str, float, list[
 
 
 def _rises(values: pd.Series) -> bool:
-    """True of numbers that rise in nearly even steps, as stamps do; a count of rows is none."""
+    """True of numbers that rise in nearly even steps, as stamps do; a count of rows is none.
+
+    And of dates.
+    """
+    if values.dtype.kind == "O":
+        return written.seconds_of_dates(values) is not None
     if values.dtype.kind not in "iuf" or len(values) <= SETTINGS.draft_rows:
         return False
     steps = np.diff(values.to_numpy(float))
@@ -268,19 +277,21 @@ def _section(table, kind: str, triads: list[Triad], rate: float, raw: bool):
         named = [unit for unit, text in WORDS.items() if re.search(text, words)]
         fast = np.nanmax(np.abs(values)) > SETTINGS.spinning or noise > SETTINGS.noisiest
         unit, scale = [*named, "deg/s" if fast else "rad/s"][0], None
+        if not named and np.nanmax(np.abs(values)) > RANGES["deg/s"][-1]:
+            unit = UNKNOWN
         if raw and not named:
             asked = f"{kind}: scale, a count in deg/s: 1/131 where the range is 250, 1/16.4 at 2000"
             return [f"{kind}:", "  unit: deg/s", *(f"  {x}: {UNKNOWN}" for x in RAW)], [asked]
     largest = float(np.nanmax(np.abs(values)))
     shown = unit if unit in RANGES else next(iter(RANGES))
     least = [r for r in RANGES[shown] if r >= 0.99 * largest * (scale or 1.0)]
-    noise *= scale or 1.0
+    full, noise = least[0] if least else largest, noise * (scale or 1.0)
     out = [
         f"{kind}:",
         f"  unit: {unit}",
-        *([f"  scale: {scale:.6g}"] if scale else []),
-        f"  noise: {noise:.2g}  # sd of a reading in the quietest second",
-        f"  range: {least[0] if least else largest:g}  # ? full scale, as the chip is set",
+        *([f"  scale: {_number(scale, 6)}"] if scale else []),
+        f"  noise: {_number(noise, 2)}  # sd of a reading in the quietest second",
+        f"  range: {_number(full, 6)}  # ? full scale, as the chip is set",
     ]
     asked = [f"{kind}: range, the chip's full scale"]
     return out, asked + [f"{kind}: unit"] * (unit == UNKNOWN)
@@ -305,6 +316,11 @@ def _force(still) -> tuple[str, float | None]:
     return (
         ("g", 1 / nearest) if abs(size / nearest - 1) < SETTINGS.draft_gravity else (UNKNOWN, None)
     )
+
+
+def _number(value: float, digits: int) -> str:
+    """Without an exponent: YAML takes 4e-05 for text."""
+    return np.format_float_positional(value, digits, unique=False, fractional=False, trim="-")
 
 
 def _quoted(name: str) -> str:

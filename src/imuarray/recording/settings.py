@@ -23,6 +23,8 @@ class Settings:
     noisiest: float = 0.025  # rad/s, sd of a gyroscope's readings
     draft_rises: float = 0.9  # of a column's steps, upwards: no sensor's
     draft_rows: int = 3  # rows
+    draft_stamped: float = 0.02  # of the rows have a stamp of their own
+    draft_rate: float = 200.0  # Hz, the likeliest of IMUs, between units that are both possible
     draft_even: float = 0.2  # of a step between stamps, by which half of them may differ
     # `layout`
     widest: float = 2.0  # m; positions without a declared unit beyond it are in another one

@@ -22,7 +22,6 @@ from imuarray.recording.units import factor, require_plausible_rate
 
 LEAVE_OUT = "leave out"  # what `incomplete_rows` may be
 BLANK = "; `incomplete_rows: leave out` keeps the rows that are whole"
-WHITESPACE = r"\s+"  # the one delimiter longer than a character
 
 
 def recording_of(table: pd.DataFrame, layout, path, columns) -> tuple[Recording, list[str]]:
@@ -54,7 +53,7 @@ def load(path, layout, columns) -> tuple[pd.DataFrame, list[str]]:
     options = {"sep": layout.get("delimiter"), "comment": layout.get("comment")}
     for key, usual in (("delimiter", ","), ("comment", "#")):
         value = layout.get(key, usual)
-        runs = key == "delimiter" and value == WHITESPACE
+        runs = key == "delimiter" and value == written.WHITESPACE
         one = isinstance(value, str) and (len(value) == 1 or runs)
         require(one, f"{columns}: {key}", "one character", repr(value))
     with expecting(path, "a CSV file with a header", (OSError, ValueError)):
@@ -67,7 +66,8 @@ def load(path, layout, columns) -> tuple[pd.DataFrame, list[str]]:
         names = head.iloc[0].fillna("").str.strip()
         table.columns = names if header == 0 else [str(k + 1) for k in range(table.shape[1])]
     table, more = written.rows_of_numbers(table)
-    return table, [*lines, *(f"{Path(path).name}: {line}" for line in more)]
+    table, cut = written.without_cut(table, Path(path))
+    return table, [*lines, *(f"{Path(path).name}: {line}" for line in more + cut)]
 
 
 def _named(section) -> set[str]:

@@ -43,6 +43,9 @@ def rough_positions(recording: Recording) -> tuple[np.ndarray, float]:
 def _equations(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients (n, `UNKNOWNS`) and forces (n, A - 1) of fast samples off the rails."""
     lost = recording.at_rail("gyroscope") | recording.at_rail("accelerometer")
+    expected = "readings off their rails, from which they follow"
+    found = f"none of {len(lost)}: is a range, a unit or a scale wrong?"
+    require(not lost.all(), "positions", expected, found)
     rate = recording.angular_rate.mean(axis=1)
     if len(rate) < SETTINGS.slope_window:
         return np.zeros((1, UNKNOWNS)), np.zeros((1, recording.specific_force.shape[1] - 1))
@@ -59,4 +62,4 @@ def _equations(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     maps = np.einsum("ij,tk->tijk", np.eye(3), force[used, 0]).reshape(-1, 3, 9)
     offsets = np.broadcast_to(np.eye(3), arms.shape)
     design = np.concatenate([arms, maps, offsets], axis=2).reshape(-1, UNKNOWNS)
-    return design, force[used, 1:].swapaxes(1, 2).reshape(len(design), -1)
+    return design, force[used, 1:].swapaxes(1, 2).reshape(-1, force.shape[1] - 1)

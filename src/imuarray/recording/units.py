@@ -16,7 +16,7 @@ UNITS = {
     "force": {"m s-2": 1.0, "m/s^2": 1.0, "m/s2": 1.0, "g": GRAVITY, "mg": 1e-3 * GRAVITY},
     "rate": {
         "rad s-1": 1.0, "rad/s": 1.0, "deg s-1": _DEGREE, "deg/s": _DEGREE, "dps": _DEGREE,
-        "mdeg/s": 1e-3 * _DEGREE,
+        "mdeg/s": 1e-3 * _DEGREE, "mdps": 1e-3 * _DEGREE,
     },
 }  # fmt: skip
 

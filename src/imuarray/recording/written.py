@@ -1,6 +1,7 @@
 """Tables as loggers and spreadsheets write them: encoding, heads, decimal marks, dates, stamps."""
 
 import re
+import warnings
 from itertools import islice
 from pathlib import Path
 
@@ -10,10 +11,13 @@ import pandas as pd
 from imuarray.errors import InputError
 from imuarray.recording.settings import SETTINGS
 
-DELIMITERS = ",", ";", "\t", "|"
+WHITESPACE = r"\s+"  # the one delimiter longer than a character
+DELIMITERS = ",", ";", "\t", "|", WHITESPACE  # the first of those that part as much
 DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
-WIDTHS = 16, 32  # bits of counters that begin anew
+# largest value, and one more, of counters that begin anew
+COUNTERS = {2**16: "16 bits", 10**9: "a second's nanoseconds", 2**32: "32 bits"}
+DAY = 86400 * 10**9  # ns
 
 
 def form_of(path: Path, named: set[str], given: dict) -> tuple[dict, list[str]]:
@@ -47,7 +51,8 @@ def form_of(path: Path, named: set[str], given: dict) -> tuple[dict, list[str]]:
     said = [f"encoding {encoding}"] * (encoding != "utf-8")
     said += ["no header: columns by their place"] * headless
     said += [f"{skip} lines before the header left out"] * (skip > 0)
-    said += [f"columns parted by {sep!r}"] * (sep != (asked or ","))
+    shown = "blanks" if sep == WHITESPACE else repr(sep)
+    said += [f"columns parted by {shown}"] * (sep != (asked or ","))
     said += ["decimal commas"] * comma + ["a line of units below the header left out"] * units
     options = given | {
         "sep": sep, "skiprows": [*range(skip + headless), *[skip + 1] * units],
@@ -59,7 +64,7 @@ def form_of(path: Path, named: set[str], given: dict) -> tuple[dict, list[str]]:
 def begin_of(lines: list[str], asked: str | None = None) -> tuple[int, str]:
     """(number of the first line that is as wide as most and has no words, its delimiter)."""
     sep = asked or max(
-        DELIMITERS, key=lambda sep: np.median([line.count(sep) for line in lines] or [0])
+        DELIMITERS, key=lambda sep: np.median([len(cells_of(line, sep)) for line in lines] or [0])
     )
     widths = [len(cells_of(line, sep)) for line in lines]
     usual = int(np.median(widths or [0]))
@@ -69,7 +74,7 @@ def begin_of(lines: list[str], asked: str | None = None) -> tuple[int, str]:
 
 def cells_of(line: str, delimiter: str) -> list[str]:
     """A line's cells without blanks and quotes."""
-    parts = line.split() if delimiter == r"\s+" else line.split(delimiter)
+    parts = line.split() if delimiter == WHITESPACE else line.split(delimiter)
     return [part.strip().strip('"') for part in parts]
 
 
@@ -99,6 +104,16 @@ def rows_of_numbers(table: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
     return pd.concat(parts, axis=1), said
 
 
+def without_cut(table: pd.DataFrame, path: Path) -> tuple[pd.DataFrame, list[str]]:
+    """The table without a last row that ends amid its line, as of a log cut off; a line on it."""
+    with open(path, "rb") as file:
+        file.seek(max(path.stat().st_size - 2, 0))
+        ended = set(file.read()) & set(b"\r\n")
+    if ended or len(table) < 2 or pd.notna(pd.to_numeric(table.iloc[-1, -1], errors="coerce")):
+        return table, []
+    return table[:-1], ["the last row is cut off: left out"]
+
+
 def plain(value) -> str:
     """A sensor's number or name in a cell as a label: 2 and 2.0 are "2"."""
     return f"{value:g}" if isinstance(value, float) else str(value)
@@ -119,15 +134,29 @@ def encoding_of(path: Path) -> str:
 
 
 def seconds_of_dates(cells: pd.Series) -> np.ndarray | None:
-    """Nanoseconds (N,) of cells that are dates or times of day; None where one is not."""
-    if cells.dtype.kind != "O" or not len(cells):
+    """Nanoseconds (N,) of cells that are dates or times of day; None where one is not.
+
+    A time of day goes on past midnight.
+    """
+    if cells.dtype.kind != "O" or not len(cells) or not re.search(r"\d:\d\d", str(cells.iloc[0])):
         return None
-    if re.match(r"\d+:\d+:", str(cells.iloc[0])):
-        found = pd.to_timedelta(cells, errors="coerce").to_numpy("timedelta64[ns]")
-    else:
-        dates = pd.to_datetime(cells, format="ISO8601", utc=True, errors="coerce")
-        found = dates.dt.tz_localize(None).to_numpy("datetime64[ns]")
-    return None if np.isnat(found).any() else found.astype("int64")
+    # 11:59:58:005 and 11:59:58,005
+    text = cells.astype(str).str.strip().str.replace(r"(:\d\d:\d\d)[:,](?=\d)", r"\1.", regex=True)
+    if re.fullmatch(r"(\d+:)?\d+:\d\d(\.\d*)?", text.iloc[0]):
+        text = "00:" * (text.iloc[0].count(":") == 1) + text
+        found = pd.to_timedelta(text, errors="coerce").to_numpy("timedelta64[ns]")
+        if np.isnat(found).any():
+            return None
+        stamps = found.astype("int64")
+        return stamps + DAY * np.cumsum(np.diff(stamps, prepend=stamps[:1]) < -DAY // 2)
+    dotted = "." in text.iloc[0].split(":")[0]  # then the day comes first
+    for how in ({"format": "ISO8601"}, {"dayfirst": dotted}, {"dayfirst": not dotted}):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # on a form that pandas has to guess
+            dates = pd.to_datetime(text, utc=True, errors="coerce", **how)
+        if dates.notna().all():
+            return dates.dt.tz_localize(None).to_numpy("datetime64[ns]").astype("int64")
+    return None
 
 
 def in_order(stamps, table: pd.DataFrame, where: str) -> tuple[np.ndarray, np.ndarray, list[str]]:
@@ -138,9 +167,9 @@ def in_order(stamps, table: pd.DataFrame, where: str) -> tuple[np.ndarray, np.nd
     none of that does it stamps stay as they are. InputError where many rows share their stamps.
     """
     rows, said = np.arange(len(stamps)), []
-    stamps, bits = _carried_on(stamps)
-    if bits:
-        said.append(f"{where}: a counter of {bits} bits began anew: carried on")
+    stamps, counter = _carried_on(stamps)
+    if counter:
+        said.append(f"{where}: a counter of {counter} began anew: carried on")
     steps, few = np.diff(stamps), SETTINGS.equal_stamps * len(stamps)
     if np.sum(steps == 0) > few and len(stamps) > SETTINGS.few_rows:
         raise InputError(f"{where}: {shared_words(steps, table)}")
@@ -170,15 +199,15 @@ def in_order(stamps, table: pd.DataFrame, where: str) -> tuple[np.ndarray, np.nd
     return stamps, rows, said
 
 
-def _carried_on(stamps) -> tuple[np.ndarray, int]:
-    """Stamps of a counter that begins anew at 2^bits, and the bits; 0 where it does not."""
+def _carried_on(stamps) -> tuple[np.ndarray, str]:
+    """Stamps of a counter that begins anew, and which of `COUNTERS` it is; "" where none does."""
     if stamps.dtype.kind == "i" and len(stamps) > 1:
         steps = np.diff(stamps)
-        for bits in WIDTHS:
-            if 0 <= stamps.min() and stamps.max() < 2**bits and steps.min() < -(2**bits) / 2:
-                turns = np.concatenate([[0], np.cumsum(steps < -(2**bits) / 2)])
-                return stamps + turns * 2**bits, bits
-    return stamps, 0
+        for size, counter in COUNTERS.items():
+            if 0 <= stamps.min() and stamps.max() < size and steps.min() < -size / 2:
+                turns = np.concatenate([[0], np.cumsum(steps < -size / 2)])
+                return stamps + turns * size, counter
+    return stamps, ""
 
 
 def shared_words(steps, table: pd.DataFrame) -> str:
