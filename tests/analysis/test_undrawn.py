@@ -27,3 +27,6 @@ def test_positions_that_nobody_drew_begin_from_the_motion():
     slow = replace(bare, specific_force=np.tile(force[:1], (len(force), 1, 1)))
     with pytest.raises(InputError, match="expected those of a drawing, or motion"):
         _placed(Opened(slow, []))
+    rails = replace(bare, gyroscope_range=1e-6)
+    with pytest.raises(InputError, match="expected readings off their rails.*none of 1000"):
+        _placed(Opened(rails, []))
