@@ -1,5 +1,9 @@
 """Tables as loggers and spreadsheets write them: read, and said; or the reason in one line."""
 
+import bz2
+import gzip
+import lzma
+
 import numpy as np
 import pytest
 import yaml
@@ -51,6 +55,24 @@ def test_a_table_s_form_is_found_and_said(tmp_path, plain, content, words):
     np.testing.assert_array_equal(found.specific_force, plain.specific_force)
     np.testing.assert_array_equal(found.time, plain.time)
     assert len(lines) == 1 and words in lines[0]
+
+
+@pytest.mark.parametrize("module", [gzip, lzma, bz2])
+def test_packed_tables_are_unpacked_and_damaged_ones_refused(tmp_path, plain, module):
+    suffix = {gzip: "gz", lzma: "xz", bz2: "bz2"}[module]
+    path, columns = tmp_path / f"log.csv.{suffix}", tmp_path / "columns.yaml"
+    whole = module.compress(text(table(ROWS)).encode())
+    path.write_bytes(whole)
+    found, lines = read_tables([path], columns)
+    np.testing.assert_array_equal(found.specific_force, plain.specific_force)
+    assert lines == []
+    for content in (whole[:-40], whole[:60] + b"x" * 40 + whole[100:], b"t,ax\n1,2\n"):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match="expected"):
+            read_tables([path], columns)
+    (tmp_path / "log.csv").write_bytes(b"PK\3\4 and more")
+    with pytest.raises(InputError, match="a spreadsheet, or an archive: save it as CSV"):
+        read_tables([tmp_path / "log.csv"], columns)
 
 
 def test_a_header_again_and_remarks_among_the_rows_are_left_out(tmp_path, plain):

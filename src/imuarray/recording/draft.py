@@ -119,8 +119,9 @@ def _read(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
     Its header is the first line of words that is as wide as those below it; without one, columns
     go by their place from 1.
     """
-    with expecting(path, "a CSV file with a header", (OSError, ValueError)):
-        with open(path, encoding=written.encoding_of(path), errors="replace") as file:
+    with expecting(path, "a CSV file with a header", written.UNREADABLE):
+        encoding = written.encoding_of(path)
+        with written.opened(path, "rt", encoding=encoding, errors="replace") as file:
             lines = [line.rstrip("\n") for line in islice(file, SETTINGS.head)]
     found = (_header(lines, sep) for sep in written.DELIMITERS)
     width, number, sep = max(found, key=lambda one: one[0])

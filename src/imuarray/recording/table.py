@@ -56,7 +56,7 @@ def load(path, layout, columns) -> tuple[pd.DataFrame, list[str]]:
         runs = key == "delimiter" and value == written.WHITESPACE
         one = isinstance(value, str) and (len(value) == 1 or runs)
         require(one, f"{columns}: {key}", "one character", repr(value))
-    with expecting(path, "a CSV file with a header", (OSError, ValueError)):
+    with expecting(path, "a CSV file with a header", written.UNREADABLE):
         options, lines = written.form_of(Path(path), _named(layout), options)
         # Two rows: a first data row longer than the header is an error here, while with a header
         # pandas would take its first cell for an index and move every name by one column.

@@ -1,14 +1,19 @@
 """Tables as loggers and spreadsheets write them: encoding, heads, decimal marks, dates, stamps."""
 
+import bz2
+import gzip
+import lzma
 import re
 import warnings
+import zlib
+from collections import deque
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 from imuarray.recording.settings import SETTINGS
 
 WHITESPACE = r"\s+"  # the one delimiter longer than a character
@@ -18,6 +23,13 @@ MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-s
 # largest value, and one more, of counters that begin anew
 COUNTERS = {2**16: "16 bits", 10**9: "a second's nanoseconds", 2**32: "32 bits"}
 DAY = 86400 * 10**9  # ns
+PACKED = {".gz": gzip.open, ".xz": lzma.open, ".bz2": bz2.open}  # as pandas infers them
+UNREADABLE = (OSError, ValueError, EOFError, zlib.error, lzma.LZMAError)
+
+
+def opened(path: Path, mode: str = "rb", **how):
+    """A table's file, unpacked where its name says that it is packed."""
+    return PACKED.get(path.suffix, open)(path, mode, **how)
 
 
 def form_of(path: Path, named: set[str], given: dict) -> tuple[dict, list[str]]:
@@ -30,7 +42,7 @@ def form_of(path: Path, named: set[str], given: dict) -> tuple[dict, list[str]]:
     of numbers as wide as most.
     """
     encoding = encoding_of(path)
-    with open(path, encoding=encoding, errors="replace", newline=None) as file:
+    with opened(path, "rt", encoding=encoding, errors="replace", newline=None) as file:
         lines = [line.rstrip("\n") for line in islice(file, SETTINGS.head)]
     asked = given.get("sep")
     best, skip, sep = 0, 0, asked or ","
@@ -106,12 +118,12 @@ def rows_of_numbers(table: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
 
 def without_cut(table: pd.DataFrame, path: Path) -> tuple[pd.DataFrame, list[str]]:
     """The table without a last row that ends amid its line, as of a log cut off; a line on it."""
-    with open(path, "rb") as file:
-        file.seek(max(path.stat().st_size - 2, 0))
-        ended = set(file.read()) & set(b"\r\n")
-    if ended or len(table) < 2 or pd.notna(pd.to_numeric(table.iloc[-1, -1], errors="coerce")):
+    if len(table) < 2 or pd.notna(pd.to_numeric(table.iloc[-1, -1], errors="coerce")):
         return table, []
-    return table[:-1], ["the last row is cut off: left out"]
+    with opened(path) as file:
+        last = deque(file, maxlen=1)[0].rstrip(b"\0")
+    ended = last[-1:] in (b"", b"\n", b"\r")
+    return (table, []) if ended else (table[:-1], ["the last row is cut off: left out"])
 
 
 def plain(value) -> str:
@@ -121,8 +133,10 @@ def plain(value) -> str:
 
 def encoding_of(path: Path) -> str:
     """By the byte-order mark, or by what the first bytes can be read as."""
-    with open(path, "rb") as file:
+    with opened(path) as file:
         start = file.read(SETTINGS.sniffed)
+    sheet = "a spreadsheet, or an archive: save it as CSV"
+    require(not start.startswith(b"PK\3\4"), str(path), "text, such as CSV", sheet)
     for mark, name in MARKS.items():
         if start.startswith(mark):
             return name
