@@ -24,7 +24,6 @@ from imuarray_papers.blind.measured import (
 from imuarray_papers.blind.scene import GYROSCOPE_RAIL, Pair, Scene
 from imuarray_papers.blind.sizes import (
     below_rails,
-    draw_seeded,
     noise_divergence,
     scale_to,
     size_of,
@@ -54,7 +53,8 @@ def middle(name):
 
 
 def drawn(there, name, sensors=(3,), seed=7, amplitude=None):
-    return draw_seeded(there, name, sensors, seed, middle(name) if amplitude is None else amplitude)
+    amplitude = middle(name) if amplitude is None else amplitude
+    return EFFECTS[name].draw(there, np.random.default_rng(seed), sensors, amplitude)
 
 
 def lever(motion, arm):

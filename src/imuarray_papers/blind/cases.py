@@ -3,12 +3,14 @@
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 
+import numpy as np
+
 from imuarray.recording import Recording
 from imuarray.streams import stream
 from imuarray_papers.blind.change import noisy_readings
 from imuarray_papers.blind.inject import CATALOGUE, EFFECTS, GAUGE, OUTSIDE
 from imuarray_papers.blind.scene import Scene
-from imuarray_papers.blind.sizes import draw_seeded, scale_to, size_of
+from imuarray_papers.blind.sizes import scale_to, size_of
 
 KINDS = ("clean", "one", "pair", "gauge", "outside", "struck")
 EXACT_STEPS = 4  # Gauss-Newton steps behind `sigma_exact`
@@ -93,11 +95,11 @@ def make(case: Case, seed: int) -> tuple[Recording, dict]:
     scene = Scene.draw(rng, case.imus, case.sampling_rate, case.duration, case.rails)
     changes = []
     for effect, sensors in case.effects:
-        directions = int(rng.integers(2**63))
-        amplitude = EFFECTS[effect].realistic(rng)
-        if case.sigma is not None and EFFECTS[effect].scalable:
+        directions, entry = int(rng.integers(2**63)), EFFECTS[effect]
+        amplitude = entry.realistic(rng)
+        if case.sigma is not None and entry.scalable:
             amplitude = scale_to(scene, effect, sensors, directions, case.sigma)
-        changes.append(draw_seeded(scene, effect, sensors, directions, amplitude))
+        changes.append(entry.draw(scene, np.random.default_rng(directions), sensors, amplitude))
     readings = noisy_readings(scene, changes, rng)
     recording = Recording(
         time=scene.time, specific_force=readings.force, angular_rate=readings.rate,

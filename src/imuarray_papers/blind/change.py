@@ -14,14 +14,14 @@ import numpy as np
 from imuarray_papers.blind.scene import Field, Pair, Scene
 
 NOTHING = Pair(None, None)
-UNIT_FORCE, UNIT_RATE = "m s-2", "rad s-1"
+UNITS = UNIT_FORCE, UNIT_RATE = "m s-2", "rad s-1"
 
 
 class Parameter(NamedTuple):
     """A drawn number, or array with a row for each affected sensor, and its unit."""
 
     value: Any
-    unit: str
+    unit: str = "1"
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,10 @@ class Effect:
 
     Attributes
     ----------
-    draw : callable (scene, rng, sensors, size) -> Change
+    name : str
+    parts : callable (scene, rng, sensors, size) -> dict
+        Keyword arguments of a `Change`; ``sensors`` among them where fewer than were asked for are
+        affected.
     unit : str
         Of the amplitude ``size``.
     low, high : float
@@ -97,15 +100,34 @@ class Effect:
     from_readings : bool
         Whether readings suffice to inject it, without the true motion (or, of coloured noise,
         without the noise apart from what it is added to).
+    everywhere : bool
+        Whether it is on all IMUs, whatever sensors are asked for.
     """
 
-    draw: Callable[..., Change]
+    name: str
+    parts: Callable[..., dict]
     unit: str
     low: float
     high: float
     limit: float = np.inf
     scalable: bool = True
     from_readings: bool = True
+    everywhere: bool = False
+
+    def draw(self, scene, rng, sensors: Sequence[int], size: float) -> Change:
+        """Draw the effect on some IMUs at one amplitude.
+
+        Raises ValueError for sensors that are not different indices.
+        """
+        known = range(scene.accelerometers)
+        chosen = tuple(int(k) for k in sensors)
+        if not chosen or any(k not in known for k in chosen) or len({*chosen}) < len(chosen):
+            raise ValueError(
+                f"sensors: expected different indices below {len(known)}, found {sensors}"
+            )
+        chosen = tuple(known) if self.everywhere else chosen
+        parts = self.parts(scene, rng, chosen, float(size))
+        return Change(self.name, **{"sensors": chosen, "size": float(size)} | parts)
 
     def realistic(self, rng) -> float:
         """An amplitude of the catalogue's column, in `unit`."""
@@ -115,54 +137,45 @@ class Effect:
 EFFECTS: dict[str, Effect] = {}
 
 
-def effect(unit: str, low: float, high: float, everywhere: bool = False, **entry):
-    """Register a function under its own name; it returns the keyword arguments of a Change.
+def effect(unit: str, low: float, high: float, **entry):
+    """Register a function, the ``parts`` of an `Effect`, under its own name."""
 
-    ``sensors`` among them where not all that were asked for are affected.
-
-    ``everywhere``: the effect is on all IMUs, whatever sensors are asked for; ``entry``: other
-    fields of `Effect`.
-    """
-
-    def register(function):
-        def draw(scene, rng, sensors: Sequence[int], size: float) -> Change:
-            known = range(scene.accelerometers)
-            chosen = tuple(int(k) for k in sensors)
-            if not chosen or any(k not in known for k in chosen) or len({*chosen}) < len(chosen):
-                raise ValueError(
-                    f"sensors: expected different indices below {len(known)}, found {sensors}"
-                )
-            chosen = tuple(known) if everywhere else chosen
-            parts = function(scene, rng, chosen, float(size))
-            return Change(function.__name__, **{"sensors": chosen, "size": float(size)} | parts)
-
-        draw.__doc__, draw.__name__ = function.__doc__, function.__name__
-        EFFECTS[function.__name__] = Effect(draw, unit, low, high, **entry)
-        return draw
+    def register(parts):
+        EFFECTS[parts.__name__] = Effect(parts.__name__, parts, unit, low, high, **entry)
+        return parts
 
     return register
 
 
-def error_of(kind: str, parameter: str, unit: str, low: float, high: float, draw=None, **entry):
-    """Register a function that gives an error of the readings, as `effect` does.
+def entries(rng, sensors, size) -> np.ndarray:
+    """Normal entries of sd ``size``, (n, 3)."""
+    return size * rng.standard_normal((len(sensors), 3))
 
-    The function is given the parameter's value, a `Field` and the list of sensors, and returns
-    what is added, (T, n, 3) after broadcasting; ``kind`` is "force" or "rate"; ``draw`` (rng,
-    sensors, size) draws the value, by default `entries`, (n, 3).
+
+def matrices(rng, sensors, size) -> np.ndarray:
+    """Normal matrices with entries of sd ``size``, (n, 3, 3)."""
+    return size * rng.standard_normal((len(sensors), 3, 3))
+
+
+def error_of(
+    name: str, kind: str, parameter: str, unit: str, low: float, high: float, error: Callable,
+    draw: Callable = entries, **entry,
+) -> None:  # fmt: skip
+    """Register an error of the readings that one parameter gives.
+
+    ``error`` gives what is added, (T, n, 3) after broadcasting, from the parameter's value and the
+    `Field` at the affected sensors; ``kind`` is "force" or "rate"; ``draw`` (rng, sensors, size)
+    draws the value. The unit is the parameter's and the amplitude's.
     """
 
-    def register(function):
-        def parts(scene, rng, sensors, size):
-            value = (draw or entries)(rng, sensors, size)
-            return {
-                "parameters": {parameter: Parameter(value, unit)},
-                f"{kind}_error": lambda field: function(value, field, list(sensors)),
-            }
+    def parts(scene, rng, sensors, size):
+        value = draw(rng, sensors, size)
+        return {
+            "parameters": {parameter: Parameter(value, unit)},
+            f"{kind}_error": lambda field: error(value, field.of(sensors)),
+        }
 
-        parts.__name__, parts.__doc__ = function.__name__, function.__doc__
-        return effect(unit, low, high, **entry)(parts)
-
-    return register
+    EFFECTS[name] = Effect(name, parts, unit, low, high, **entry)
 
 
 def spread(scene: Scene, sensors, values: np.ndarray, rest: float = 0.0) -> np.ndarray:
@@ -180,22 +193,12 @@ def which_kinds(rng) -> tuple[bool, bool]:
 def kind_names(kinds: tuple[bool, bool]) -> Parameter:
     """The affected kinds of sensors by name."""
     known = zip(("accelerometer", "gyroscope"), kinds, strict=True)
-    return Parameter([name for name, chosen in known if chosen], "1")
+    return Parameter([name for name, chosen in known if chosen])
 
 
 def of_kinds(kinds: tuple[bool, bool], value) -> Pair:
     """The value for the affected kinds of sensors, None for the other."""
     return Pair(*(value if chosen else None for chosen in kinds))
-
-
-def entries(rng, sensors, size) -> np.ndarray:
-    """Normal entries of sd ``size``, (n, 3)."""
-    return size * rng.standard_normal((len(sensors), 3))
-
-
-def matrices(rng, sensors, size) -> np.ndarray:
-    """Normal matrices with entries of sd ``size``, (n, 3, 3)."""
-    return size * rng.standard_normal((len(sensors), 3, 3))
 
 
 def altered(sensors, rules: Pair) -> Callable[[Pair], Pair]:
@@ -240,16 +243,10 @@ def with_errors(field: Field, changes: Sequence[Change]) -> Pair:
 
 
 def _total_ages(changes: Sequence[Change]) -> Pair:
-    """Ages of all effects together; the same object twice if both sensors share them."""
-    if all(change.ages.force is change.ages.rate for change in changes):
-        total = _added([change.ages.force for change in changes])
-        return Pair(total, total)
-    return Pair(*(_added(ages) for ages in zip(*(c.ages for c in changes), strict=True)))
-
-
-def _added(parts):
-    known = [part for part in parts if part is not None]
-    return sum(known) if known else None
+    """Ages of all effects together."""
+    kinds = zip(NOTHING, *(change.ages for change in changes), strict=True)
+    known = ([ages for ages in parts if ages is not None] for parts in kinds)
+    return Pair(*(sum(parts) if parts else None for parts in known))
 
 
 def draw_noise(scene: Scene, changes: Sequence[Change], rng) -> Pair:

@@ -1,8 +1,9 @@
 """Errors of the sensors' mean: bias, scale, axes, curvature, place; of all sensors; and unknown.
 
 u is the true specific force at a triad and w the true angular rate, at the sensor's own instants.
-The drawn entries have the sd ``size``; see `change.error_of` and `change.effect`. For ``gauge_``
-effects, which all sensors share, the sensors asked for are ignored.
+The drawn entries have the sd ``size``; see `change.effect`, and `change.error_of`: errors are given
+the value drawn and a `Field` x at the affected sensors. For ``gauge_`` effects, which all sensors
+share, the sensors asked for are ignored.
 """
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from imuarray_papers.blind.change import (
     UNIT_FORCE,
     UNIT_RATE,
+    UNITS,
     Parameter,
     altered,
     applied,
@@ -38,30 +40,16 @@ def _off_diagonal(rng, sensors, size) -> np.ndarray:
     return matrices(rng, sensors, size) * (1 - np.eye(3))
 
 
-@error_of("force", "bias", UNIT_FORCE, 0.01, 0.1)
-def accelerometer_bias(bias, field, sensors):
-    """u + b; size in m/s^2."""
-    return bias
-
-
-@error_of("force", "scale", "1", 1e-3, 0.03)
-def accelerometer_scale(scale, field, sensors):
-    """(1 + c_i) u_i."""
-    return scale * field.force[:, sensors]
-
-
-@error_of("force", "misalignment", "1", 1e-3, 0.02, _off_diagonal)
-def accelerometer_misalignment(matrix, field, sensors):
-    """u + M u, M without diagonal."""
-    return applied(matrix, field.force[:, sensors])
-
-
-@error_of(
-    "force", "curvature", "s2 m-1", 0.0015 / ACCELEROMETER_RAIL, 0.005 / ACCELEROMETER_RAIL
+error_of("accelerometer_bias", "force", "bias", UNIT_FORCE, 0.01, 0.1, lambda b, x: b)
+error_of("accelerometer_scale", "force", "scale", "1", 1e-3, 0.03, lambda c, x: c * x.force)
+error_of(
+    "accelerometer_misalignment", "force", "misalignment", "1", 1e-3, 0.02,
+    lambda M, x: applied(M, x.force), _off_diagonal,
 )  # fmt: skip
-def accelerometer_nonlinearity(curvature, field, sensors):
-    """u_i + c_i u_i^2; size in s^2/m."""
-    return curvature * field.force[:, sensors] ** 2
+error_of(
+    "accelerometer_nonlinearity", "force", "curvature", "s2 m-1", 0.0015 / ACCELEROMETER_RAIL,
+    0.005 / ACCELEROMETER_RAIL, lambda c, x: c * x.force**2,
+)  # fmt: skip
 
 
 @effect("m", 1e-4, 1.5e-3, from_readings=False)
@@ -80,47 +68,30 @@ def size_effect(scene, rng, sensors, size):
         # which of its axes lies along each of the array's
         arms = np.einsum("kia,kaj->kij", np.abs(scene.array.turns), turned)
     arms = np.sqrt(1.5) * (arms - arms.mean(axis=1, keepdims=True))  # of the same size
-    said = {"lever_arm": Parameter(arms, "m"), "alike": Parameter(bool(alike), "1")}
-    error = {"force_error": lambda field: apart(arms, field, list(sensors))}
-    return {"parameters": said, **error}
+    said = {"lever_arm": Parameter(arms, "m"), "alike": Parameter(bool(alike))}
+    return {"parameters": said, "force_error": lambda field: apart(arms, field.of(sensors))}
 
 
-def apart(arms, field, sensors) -> np.ndarray:
+def apart(arms, x) -> np.ndarray:
     """Specific force that axes at ``arms`` (n, axis, 3) m from their triads add, (T, n, 3)."""
-    seen = [field.lever(arms[:, axis], sensors)[..., axis] for axis in range(3)]
+    seen = [x.states.lever(arms[:, axis])[..., axis] for axis in range(3)]
     return np.stack(seen, axis=-1)
 
 
-@error_of("rate", "bias", UNIT_RATE, 0.01 * DEGREE, DEGREE)
-def gyroscope_bias(bias, field, sensors):
-    """w + b; size in rad/s."""
-    return bias
-
-
-@error_of("rate", "scale", "1", 1e-3, 0.03)
-def gyroscope_scale(scale, field, sensors):
-    """(1 + c_i) w_i."""
-    return scale * field.rate[:, sensors]
-
-
-@error_of("rate", "misalignment", "1", 1e-3, 0.02, _off_diagonal)
-def gyroscope_misalignment(matrix, field, sensors):
-    """w + M w, M without diagonal."""
-    return applied(matrix, field.rate[:, sensors])
-
-
-@error_of(
-    "rate", "sensitivity", "rad s m-1", 0.03 * DEGREE / GRAVITY, 0.3 * DEGREE / GRAVITY, matrices
+error_of("gyroscope_bias", "rate", "bias", UNIT_RATE, 0.01 * DEGREE, DEGREE, lambda b, x: b)
+error_of("gyroscope_scale", "rate", "scale", "1", 1e-3, 0.03, lambda c, x: c * x.rate)
+error_of(
+    "gyroscope_misalignment", "rate", "misalignment", "1", 1e-3, 0.02,
+    lambda M, x: applied(M, x.rate), _off_diagonal,
 )  # fmt: skip
-def gyroscope_g_sensitivity(matrix, field, sensors):
-    """w + G u, u the specific force at the same IMU; size in rad/s per m/s^2."""
-    return applied(matrix, field.force_at_gyroscopes[:, sensors])
-
-
-@error_of("rate", "curvature", "s rad-1", 0.0006 / GYROSCOPE_RAIL, 0.002 / GYROSCOPE_RAIL)
-def gyroscope_nonlinearity(curvature, field, sensors):
-    """w_i + c_i w_i^2; size in s/rad."""
-    return curvature * field.rate[:, sensors] ** 2
+error_of(
+    "gyroscope_g_sensitivity", "rate", "sensitivity", "rad s m-1", 0.03 * DEGREE / GRAVITY,
+    0.3 * DEGREE / GRAVITY, lambda G, x: applied(G, x.force_at_gyroscopes), matrices,
+)  # fmt: skip
+error_of(
+    "gyroscope_nonlinearity", "rate", "curvature", "s rad-1", 0.0006 / GYROSCOPE_RAIL,
+    0.002 / GYROSCOPE_RAIL, lambda c, x: c * x.rate**2,
+)  # fmt: skip
 
 
 @effect("0.1 m s-2 or 0.3 deg s-1", 0.33, 3.3)
@@ -135,12 +106,11 @@ def bias_drift(scene, rng, sensors, size):
     warming = rng.random() < 0.5
     constant = rng.uniform(0.15, 0.4) * scene.duration
     past = scene.time - scene.time[0]
-    shape = 1 - np.exp(-past / constant) if warming else past
-    said = {"form": Parameter("exponential" if warming else "linear", "1")}
+    course = 1 - np.exp(-past / constant) if warming else past
+    said = {"form": Parameter("exponential" if warming else "linear")}
     if warming:
         said["time_constant"] = Parameter(constant, "s")
-    ends = [size * unit for unit in DRIFTS]
-    return _drifting(rng, sensors, ends, kinds, (shape / shape[-1])[:, None, None], said)
+    return _drifting(rng, sensors, [size * end for end in DRIFTS], kinds, course, said)
 
 
 @effect("0.05 m s-2 and 0.1 deg s-1", 0.2, 2.0, everywhere=True)
@@ -153,19 +123,23 @@ def warm_up(scene, rng, sensors, size):
     board, holder = rng.uniform([0.1, 0.5], [0.4, 1.5]) * scene.duration
     warmth = 0.8 * (1 - np.exp(-past / board)) + 0.2 * (1 - np.exp(-past / holder))
     said = {"time_constants": Parameter([float(board), float(holder)], "s")}
-    course = (warmth / warmth[-1])[:, None, None]
-    ends = [size * unit for unit in WARMING]
-    return _drifting(rng, sensors, ends, (True, True), course, said)
+    return _drifting(rng, sensors, [size * end for end in WARMING], (True, True), warmth, said)
 
 
-def _drifting(rng, sensors, sizes, kinds, course, said) -> dict:
-    """Parts of a `Change`: offsets of the chosen kinds along a course (T, n or 1, 1)."""
-    parts, names = {"parameters": said}, (("force", UNIT_FORCE), ("rate", UNIT_RATE))
-    for (what, unit), size, chosen in zip(names, sizes, kinds, strict=True):
+def _drifting(rng, sensors, sizes, kinds, course, said, scales: bool = False) -> dict:
+    """Parts of a `Change`: of the chosen kinds offsets, or scales, of ``sizes`` at a course's end.
+
+    ``course`` (T,), of any height.
+    """
+    parts, shape = {"parameters": said}, (course / course[-1])[:, None, None]
+    for what, unit, size, chosen in zip(("force", "rate"), UNITS, sizes, kinds, strict=True):
         end = entries(rng, sensors, size)
         if chosen:
-            said[f"{what}_drift"] = Parameter(end, unit)
-            parts[f"{what}_error"] = lambda field, end=end: end * course
+            name, unit = ("scale_at_end", "1") if scales else ("drift", unit)
+            said[f"{what}_{name}"] = Parameter(end, unit)
+            parts[f"{what}_error"] = lambda field, end=end, what=what: (
+                end * shape * (getattr(field.of(sensors), what) if scales else 1.0)
+            )
     return parts
 
 
@@ -175,7 +149,7 @@ def axis_swap(scene, rng, sensors, size):
     kinds = which_kinds(rng)
     tables = np.stack([_wrong_axes(rng) for _ in sensors])
     rules = of_kinds(kinds, lambda values: applied(tables, values))
-    said = {"reading_from_true": Parameter(tables, "1"), "of": kind_names(kinds)}
+    said = {"reading_from_true": Parameter(tables), "of": kind_names(kinds)}
     return {"parameters": said, "relabel": altered(sensors, rules)}
 
 
@@ -197,7 +171,7 @@ def position_shift(scene, rng, sensors, size):
     said = {"shift": Parameter(shift, "m"), "instant": Parameter(float(instant), "s")}
     return {
         "parameters": said,
-        "force_error": lambda field: np.where(later, field.lever(shift, sensors), 0.0),
+        "force_error": lambda field: np.where(later, field.of(sensors).states.lever(shift), 0.0),
     }
 
 
@@ -206,16 +180,15 @@ def _signed(rng, sensors, size) -> float:
     return size * float(rng.choice([-1.0, 1.0]))
 
 
-@error_of("rate", "scale", "1", 1e-3, 0.03, _signed, **COMMON)
-def gauge_gyroscope_scale(scale, field, sensors):
-    """(1 + c) w on all axes of all gyroscopes; the same as a dilation r / (1 + c)^2."""
-    return scale * field.rate
-
-
-@error_of("force", "scale", "1", 1e-3, 0.03, _signed, **COMMON)
-def gauge_accelerometer_scale(scale, field, sensors):
-    """(1 + c) u on all axes of all accelerometers; the same as a dilation (1 + c) r."""
-    return scale * field.force
+# the same as a dilation r / (1 + c)^2, and (1 + c) r
+error_of(
+    "gauge_gyroscope_scale", "rate", "scale", "1", 1e-3, 0.03, lambda c, x: c * x.rate, _signed,
+    **COMMON,
+)  # fmt: skip
+error_of(
+    "gauge_accelerometer_scale", "force", "scale", "1", 1e-3, 0.03, lambda c, x: c * x.force,
+    _signed, **COMMON,
+)  # fmt: skip
 
 
 @effect("s", 1e-4, 5e-3, **COMMON)
@@ -226,43 +199,29 @@ def gauge_sensor_delay(scene, rng, sensors, size):
     return {"parameters": {"delay": Parameter(delay, "s")}, "ages": Pair(ages, ages)}
 
 
-@error_of(
-    "force", "bias", UNIT_FORCE, 0.01, 0.1,
+# all part of s: the same b on all triads; axis i of every triad at r_k + d_i
+error_of(
+    "gauge_accelerometer_bias", "force", "bias", UNIT_FORCE, 0.01, 0.1, lambda b, x: b,
     lambda rng, sensors, size: size * rng.standard_normal(3), **COMMON,
 )  # fmt: skip
-def gauge_accelerometer_bias(bias, field, sensors):
-    """u + b, the same b on all triads: part of s."""
-    return bias
-
-
-@error_of(
-    "force", "lever_arm", "m", 1e-4, 1.5e-3,
+error_of(
+    "gauge_lever_arm", "force", "lever_arm", "m", 1e-4, 1.5e-3, lambda d, x: apart(d[None], x),
     lambda rng, sensors, size: size * rng.standard_normal((3, 3)), from_readings=False, **COMMON,
 )  # fmt: skip
-def gauge_lever_arm(arms, field, sensors):
-    """Axis i of every triad sits at r_k + d_i: one specific force for all, part of s."""
-    return apart(np.broadcast_to(arms, (len(sensors), 3, 3)), field, sensors)
-
-
-@error_of(
-    "force", "coefficient", "s4 m-2", 0.001 / ACCELEROMETER_RAIL**2, 0.01 / ACCELEROMETER_RAIL**2
+error_of(
+    "outside_cubic", "force", "coefficient", "s4 m-2", 0.001 / ACCELEROMETER_RAIL**2,
+    0.01 / ACCELEROMETER_RAIL**2, lambda c, x: c * x.force**3,
 )  # fmt: skip
-def outside_cubic(coefficient, field, sensors):
-    """u_i + c_i u_i^3; size in (m/s^2)^-2."""
-    return coefficient * field.force[:, sensors] ** 3
-
-
-@error_of("force", "compliance", "s2", 1e-6, 3e-5, matrices, from_readings=False)
-def outside_flexible_board(compliance, field, sensors):
-    """The triad sits at r_k + K u_k, quasi-statically; size in metres per m/s^2."""
-    return field.lever(applied(compliance, field.force[:, sensors]), sensors)
-
-
-@error_of("force", "coefficient", "m s2", 1e-7, 3e-6, from_readings=False)
-def outside_vibration_rectification(coefficient, field, sensors):
-    """u + c |w'|^2; size in m/s^2 per (rad/s^2)^2."""
-    shaking = field.states.columns(sensors).acceleration
-    return coefficient * (shaking**2).sum(axis=-1, keepdims=True)
+# the triad sits at r_k + K u_k, quasi-statically
+error_of(
+    "outside_flexible_board", "force", "compliance", "s2", 1e-6, 3e-5,
+    lambda K, x: x.states.lever(applied(K, x.force)), matrices, from_readings=False,
+)  # fmt: skip
+# c |w'|^2
+error_of(
+    "outside_vibration_rectification", "force", "coefficient", "m s2", 1e-7, 3e-6,
+    lambda c, x: c * (x.states.acceleration**2).sum(axis=-1, keepdims=True), from_readings=False,
+)  # fmt: skip
 
 
 @effect("m s-1", 1e-3, 0.05)
@@ -288,7 +247,7 @@ def outside_hysteresis(scene, rng, sensors, size):
     keep = np.exp(-1 / (lag * scene.sampling_rate))
 
     def error(field):
-        rising = np.sign(np.gradient(field.force[:, list(sensors)], axis=0))
+        rising = np.sign(np.gradient(field.of(sensors).force, axis=0))
         return depth * lfilter([1 - keep], [1.0, -keep], rising, axis=0)
 
     said = {"depth": Parameter(depth, UNIT_FORCE), "lag": Parameter(lag, "s")}
@@ -298,15 +257,5 @@ def outside_hysteresis(scene, rng, sensors, size):
 @effect("1", 1e-3, 0.03)
 def outside_scale_drift(scene, rng, sensors, size):
     """(1 + c_i t / T) on accelerometers, gyroscopes or both; size at the end."""
-    kinds = which_kinds(rng)
-    past = scene.time - scene.time[0]
-    shape = (past / past[-1])[:, None, None]
-    parts = {"parameters": {}}
-    for what, chosen in zip(("force", "rate"), kinds, strict=True):
-        end = entries(rng, sensors, size)
-        if chosen:
-            parts["parameters"][f"{what}_scale_at_end"] = Parameter(end, "1")
-            parts[f"{what}_error"] = lambda field, end=end, what=what: (
-                end * shape * getattr(field, what)[:, list(sensors)]
-            )
-    return parts
+    course = scene.time - scene.time[0]
+    return _drifting(rng, sensors, (size, size), which_kinds(rng), course, {}, scales=True)

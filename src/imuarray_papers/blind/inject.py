@@ -5,7 +5,7 @@ the project's list; ``outside_`` ones are not in it, and the right answer is "un
 recording can distinguish ``gauge_`` ones from a clean one.
 """
 
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from imuarray_papers.blind.change import (
     EFFECTS,
     UNIT_FORCE,
     UNIT_RATE,
+    Effect,
     Parameter,
     altered,
     effect,
@@ -30,22 +31,11 @@ CLOCK_PERIOD = 1e-3  # s, P of a free-running IMU
 LATENCY = 5e-5  # s, sd of the host's
 
 
-@effect("1", np.log(1.3), np.log(LOUDEST), limit=np.log(50.0))
-def accelerometer_noise(scene, rng, sensors, size):
-    """The noise of the triad is c times the declared one; size is ln c (see `_louder`)."""
-    return _louder(scene, rng, sensors, size, (True, False))
-
-
-@effect("1", np.log(1.3), np.log(LOUDEST), limit=np.log(50.0))
-def gyroscope_noise(scene, rng, sensors, size):
-    """The noise of the triad is c times the declared one; size is ln c (see `_louder`)."""
-    return _louder(scene, rng, sensors, size, (False, True))
-
-
 def _louder(scene, rng, sensors, size, kinds):
-    """c_k = exp(size x_k), x_k of one sign: all alike or each its own, in half the draws each.
+    """The noise of the triad is c_k = exp(size x_k) times the declared one, x_k of one sign.
 
-    A quarter of the draws are quieter, scaled so that ln 5 louder is answered by 0.5.
+    All are alike or each is its own, in half the draws each. A quarter of the draws are quieter,
+    scaled so that ln 5 louder is answered by 0.5.
     """
     quiet = rng.random() < 0.25 and not scene.measured
     own = rng.uniform(0.5, 1.0, len(sensors)) if rng.random() < 0.5 else np.ones(len(sensors))
@@ -54,11 +44,17 @@ def _louder(scene, rng, sensors, size, kinds):
     direction = np.log(QUIETEST) / np.log(LOUDEST) if quiet else 1.0
     factors = np.exp(size * direction * own)
     return {
-        "parameters": {"factor": Parameter(factors, "1")},
+        "parameters": {"factor": Parameter(factors)},
         "gain": of_kinds(kinds, spread(scene, sensors, factors, 1.0)[:1]),
         # a louder triad is held against the declared level
         "divergence": lambda samples: level_divergence(factors[None]) * samples,
     }
+
+
+for name, kinds in (("accelerometer_noise", (True, False)), ("gyroscope_noise", (False, True))):
+    EFFECTS[name] = Effect(
+        name, partial(_louder, kinds=kinds), "1", np.log(1.3), np.log(LOUDEST), np.log(50.0)
+    )
 
 
 def level_divergence(gain: np.ndarray) -> float:
@@ -82,13 +78,9 @@ def heavy_tails(scene, rng, sensors, size):
         gain = spread(scene, sensors, np.where(rank < wild_ones, 1 + size, 1.0), 1.0)
         gains.append(gain if chosen else None)
     true_share, triads = wild_ones / len(scene.time), len(sensors) * sum(kinds)
-    said = {
-        "share": Parameter(true_share, "1"),
-        "factor": Parameter(1 + size, "1"),
-        "of": kind_names(kinds),
-    }
+    factor, of = Parameter(1 + size), kind_names(kinds)
     return {
-        "parameters": said,
+        "parameters": {"share": Parameter(true_share), "factor": factor, "of": of},
         "gain": Pair(*gains),
         # the level is another effect's
         "divergence": lambda samples: _tails_divergence(true_share, 1 + size) * triads * samples,
@@ -121,7 +113,7 @@ def coloured_noise(scene, rng, sensors, size):
     kinds = which_kinds(rng)
     rho = np.zeros(scene.accelerometers)
     rho[list(sensors)] = size
-    said = {"coefficient": Parameter(size, "1"), "of": kind_names(kinds)}
+    said = {"coefficient": Parameter(size), "of": kind_names(kinds)}
     if 0 < size < 1:
         lasting = -1 / (scene.sampling_rate * np.log(size))
         said["correlation_time"] = Parameter(float(lasting), "s")
@@ -172,7 +164,7 @@ def stale_samples(scene, rng, sensors, size):
 
     columns = np.arange(len(sensors))
     rules = of_kinds((True, True), lambda values: values[source, columns])
-    said = {"share": Parameter(stale.mean(axis=0), "1")}
+    said = {"share": Parameter(stale.mean(axis=0))}
     return {"parameters": said, "after": altered(sensors, rules), "stale": True}
 
 
@@ -191,7 +183,7 @@ def gyroscope_delay(scene, rng, sensors, size):
     own = rng.standard_normal(len(sensors))
     # a common delay has no companions to make up for a small draw
     delay = size * (np.sign(own[0]) * np.ones(len(sensors)) if common else own)
-    said = {"delay": Parameter(delay, "s"), "common": Parameter(bool(common), "1")}
+    said = {"delay": Parameter(delay, "s"), "common": Parameter(bool(common))}
     return {"parameters": said, "ages": Pair(None, spread(scene, sensors, delay))}
 
 
@@ -213,7 +205,7 @@ def sensor_clock(scene, rng, sensors, size):
     ages = spread(scene, sensors, -waiting * (size / CLOCK_PERIOD))
     said = {
         "period": Parameter(period, "s"),
-        "clock_offset": Parameter(offset, "1"),
+        "clock_offset": Parameter(offset),
         "phase": Parameter(phase, "s"),
         "host_latency": Parameter(uneven, "s"),
         "largest_age": Parameter(size * (1 + offset), "s"),
@@ -271,7 +263,7 @@ def outside_rate_noise(scene, rng, sensors, size):
     # against the constant level of the same mean square: the level is another effect's
     shape = own / np.sqrt((own**2).mean(axis=0))
     return {
-        "parameters": {"growth": Parameter(size, "1"), "of": kind_names(kinds)},
+        "parameters": {"growth": Parameter(size), "of": kind_names(kinds)},
         "gain": of_kinds(kinds, gain),
         "divergence": lambda samples: level_divergence(shape) * sum(kinds) * samples,
     }
@@ -292,7 +284,7 @@ def outside_quantisation(scene, rng, sensors, size):
 
     steps = zip(scene.noise, scene.limits, kinds, strict=True)
     rules = [rounding(size * sd, limit) if chosen else None for sd, limit, chosen in steps]
-    said = {"lsb_in_noise_sd": Parameter(size, "1"), "of": kind_names(kinds)}
+    said = {"lsb_in_noise_sd": Parameter(size), "of": kind_names(kinds)}
     return {"parameters": said, "after": altered(sensors, Pair(*rules))}
 
 

@@ -53,9 +53,10 @@ class Field(NamedTuple):
     force_at_gyroscopes: np.ndarray  # u_k of each IMU at its gyroscope's instants, (T, G, 3) m/s^2
     states: States | None  # at the accelerometers' instants; None of a measured recording
 
-    def lever(self, arms: np.ndarray, sensors) -> np.ndarray:
-        """Specific force that arms (n, 3) or (T, n, 3) add at some triads, (T, n, 3) m/s^2."""
-        return self.states.columns(sensors).lever(arms)
+    def of(self, sensors) -> Self:
+        """The quantities of some sensors, (T, n, 3)."""
+        parts = (x[:, list(sensors)] for x in self[:3])
+        return Field(*parts, self.states and self.states.columns(sensors))
 
 
 def _waves(waves, time: np.ndarray, orders) -> list[np.ndarray]:

@@ -161,11 +161,6 @@ def noise_divergence(scene: Scene, change: Change, samples: int) -> float:
     return float(change.divergence(samples) * (readings - 9) / readings)
 
 
-def draw_seeded(scene, effect: str, sensors, rng_seed: int, size: float) -> Change:
-    """The effect at one amplitude; a seed stands for the directions and patterns drawn."""
-    return EFFECTS[effect].draw(scene, np.random.default_rng(rng_seed), sensors, size)
-
-
 def scale_to(scene: Scene, effect: str, sensors, rng_seed: int, sigma: float) -> float:
     """The amplitude, in the effect's unit, at which the effect seeded by ``rng_seed`` has a size.
 
@@ -178,7 +173,8 @@ def scale_to(scene: Scene, effect: str, sensors, rng_seed: int, sigma: float) ->
     entry = EFFECTS[effect]
 
     def size(amplitude):
-        return size_of(scene, draw_seeded(scene, effect, sensors, rng_seed, amplitude))
+        rng = np.random.default_rng(rng_seed)
+        return size_of(scene, entry.draw(scene, rng, sensors, amplitude))
 
     return _search(size, sigma, entry.low, entry.limit)
 

@@ -27,16 +27,6 @@ def batch_of(cases: Sequence[Case], batch: int, batches: int) -> list[Case]:
     return list(cases[batch::batches])
 
 
-def ask(diagnose: Callable, recording, without, seed: int) -> dict:
-    """The diagnosis of a recording: the entries `KEPT` of its `diagnosis.json`.
-
-    Raises ValueError where they are not plain JSON, KeyError where one is missing.
-    """
-    document = diagnose(recording, seed=seed, without=without).document
-    kept = {name: document[name] for name in KEPT}
-    return json.loads(json.dumps(kept, allow_nan=False))
-
-
 def diagnosed(case: Case, seed: int, diagnose: Callable) -> dict:
     """A case's truth and its diagnosis, made without the truth.
 
@@ -48,15 +38,17 @@ def diagnosed(case: Case, seed: int, diagnose: Callable) -> dict:
     Returns
     -------
     dict
-        ``case`` (id), ``truth`` (see `make`), ``diagnosis`` (see `ask`; None after a crash),
-        ``error`` (text of a crash, or None); ``seconds`` of wall time and ``cpu_seconds`` of all
-        threads that it took.
+        ``case`` (id), ``truth`` (see `make`), ``diagnosis`` (the entries `KEPT`; None after a
+        crash, as which counts that one is missing or not plain JSON), ``error`` (text of a crash,
+        or None); ``seconds`` of wall time and ``cpu_seconds`` of all threads that it took.
     """
     recording, truth = make(case, seed)
     answer, error = None, None
     start, cpu_start = time.perf_counter(), time.process_time()
     try:
-        answer = ask(diagnose, recording, case.struck, seed)
+        document = diagnose(recording, seed=seed, without=case.struck).document
+        kept = {name: document[name] for name in KEPT}
+        answer = json.loads(json.dumps(kept, allow_nan=False))
     except Exception as crash:  # whatever it is, it is a result of the study
         error = f"{type(crash).__name__}: {crash}"
         traceback.print_exc()

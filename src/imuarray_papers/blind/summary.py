@@ -1,6 +1,5 @@
 """Graded rows as tables: recordings, confusion, coverage; and the acceptance criteria."""
 
-from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
@@ -77,28 +76,23 @@ def confusion(rows: list[dict]) -> pd.DataFrame:
     the name, where its class holds an effect of the truth and where it does not; a recording with
     several causes is in several columns. `UNEXPLAINED` counts the flag, whatever is named.
     """
-    tally: dict[tuple, Counter] = {}
-    for row in rows:
+    lines = []
+    for number, row in enumerate(rows):
         if row["kind"] == "pair" or (row["kind"] == "one" and row["sigma"] < REACHED * LARGE):
             continue
         truth = "+".join(effect["effect"] for effect in row["truth"]) or "clean"
-        counts = tally.setdefault((row["kind"], truth), Counter())
-        counts["recordings"] += 1
-        for name, right in _columns(row).items():
-            counts[name, right] += 1
-    effects, lines = [*EFFECTS], []
-    for kind, truth in sorted(
-        tally,  # kinds in the matrix' order, effects in the registry's
-        key=lambda key: (KINDS.index(key[0]), effects.index(key[1]) if key[1] in effects else -1),
-    ):
-        counts = tally[kind, truth]
-        number = counts["recordings"]
-        for name in dict.fromkeys(key[0] for key in counts if key != "recordings"):
-            right, wrong = counts[name, True], counts[name, False]
-            line = {"kind": kind, "truth": truth, "named": name, "recordings": number}
-            share = {"right_share": right / number, "wrong_share": wrong / number}
-            lines.append(line | {"right": right, "wrong": wrong} | share)
-    return pd.DataFrame(lines)
+        named = _columns(row).items()
+        lines += [(row["kind"], truth, name, number, right, not right) for name, right in named]
+    keys = ["kind", "truth", "named", "recordings"]
+    table = pd.DataFrame(lines, columns=[*keys, "right", "wrong"])
+    table["recordings"] = table.groupby(["kind", "truth"]).recordings.transform("nunique")
+    table = table.groupby(keys, sort=False)[["right", "wrong"]].sum().reset_index()
+    # kinds in the matrix' order, effects in the registry's
+    order = [*KINDS, *EFFECTS].index
+    table = table.sort_values(["kind", "truth"], key=lambda column: column.map(order))
+    for name in ("right", "wrong"):
+        table[f"{name}_share"] = table[name] / table.recordings
+    return table.reset_index(drop=True)
 
 
 def _columns(row: dict) -> dict[str, bool]:
@@ -227,48 +221,40 @@ def criteria(table: pd.DataFrame) -> pd.DataFrame:
     lines = []
     for item in CRITERIA:
         line, every = item.measure(table[table.standard]), item.measure(table)
-        number, low, high = line["recordings"], line["low"], line["high"]
-        lines.append({
-            "id": item.id, "bar": item.says, "aim": _aim_text(item.aim), **line,
-            "verdict": verdict(item.aim, number, line["share"]),
-            "sure": is_sure(item.aim, number, low, high),
-            **{f"all_{name}": value for name, value in every.items()},
-        })  # fmt: skip
+        limits = (line[name] for name in ("share", "low", "high"))
+        aim, verdict, sure = judged(item.aim, line["recordings"], *limits)
+        lines.append(
+            {"id": item.id, "bar": item.says, "aim": aim, **line, "verdict": verdict, "sure": sure}
+            | {f"all_{name}": value for name, value in every.items()}
+        )
     # the false alarms' share once more: its upper limit, of enough recordings
-    first, aim = lines[0], (0.0, UPPER_LIMIT)
-    enough = first["recordings"] >= UPPER_COUNT
+    first = lines[0]
+    aim, verdict, _ = judged((0.0, UPPER_LIMIT), 1, first["high"])
     lines.insert(1, first | {
-        "id": "false_alarms_limit", "aim": _aim_text(aim), "sure": None,
+        "id": "false_alarms_limit", "aim": aim, "sure": None,
         "bar": f"the same: upper 95 % limit, over {UPPER_COUNT} or more recordings",
-        "verdict": verdict(aim, 1, first["high"]) if enough else f"needs {UPPER_COUNT}",
+        "verdict": verdict if first["recordings"] >= UPPER_COUNT else f"needs {UPPER_COUNT}",
     })  # fmt: skip
     return pd.DataFrame(lines)
 
 
-def _aim_text(aim: tuple | None) -> str:
-    if aim is None:
-        return ""
-    low, high = (f"{100 * value:g}" for value in aim)
-    if aim[1] == 1.0:
-        return f"at least {low} %"
-    if aim[1] == 0.0:
-        return "never"
-    return f"at most {high} %" if aim[0] == 0.0 else f"{low} to {high} %"
+def judged(aim: tuple | None, number: int, share: float, low=np.nan, high=np.nan) -> tuple:
+    """An aim in words, the verdict on a share, and whether its limits are sure of that.
 
-
-def verdict(aim: tuple | None, number: int, share: float) -> str:
-    """'pass', or by how many percentage points the share misses the limit."""
+    The verdict is 'pass', or by how many percentage points the share misses the aim. Sure is the
+    verdict (bool) where it holds anywhere between the limits, else None.
+    """
     if aim is None:
-        return ""
+        return "", "", None
+    least, most = aim
+    words = f"{100 * least:g} to {100 * most:g} %"
+    if least == 0.0:
+        words = f"at most {100 * most:g} %" if most else "never"
+    elif most == 1.0:
+        words = f"at least {100 * least:g} %"
     if not number:
-        return NONE
-    miss = max(aim[0] - share, share - aim[1])
-    return PASS if miss <= 0 else f"short by {100 * miss:.1f} points"
-
-
-def is_sure(aim: tuple | None, number: int, low: float, high: float) -> bool | None:
-    """The verdict where it holds anywhere between the limits, else None."""
-    if aim is None or not number or np.isnan(low):
-        return None
-    inside = aim[0] <= low and high <= aim[1]
-    return bool(inside or high < aim[0] or low > aim[1])
+        return words, NONE, None
+    miss = max(least - share, share - most)
+    inside = least <= low and high <= most
+    sure = None if np.isnan(low) else bool(inside or high < least or low > most)
+    return words, PASS if miss <= 0 else f"short by {100 * miss:.1f} points", sure
