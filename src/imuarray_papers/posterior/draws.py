@@ -118,35 +118,29 @@ def exponents(first, size, data, quartic, b, numbers, out):
 
 
 @njit
-def _exponentials(size, work):
-    """top = the largest exponent of N, total = the sum of exp(exponent - top), by sample."""
-    exponent, top, total = work.exponent, work.top, work.total
-    for i in range(size):
-        top[i] = exponent[0, i]
-        total[i] = 0.0
-    for n in range(1, exponent.shape[0]):
-        for i in range(size):
-            top[i] = max(top[i], exponent[n, i])
-    for n in range(exponent.shape[0]):
-        for i in range(size):
-            # NaN passes max as its first argument, not as its second
-            total[i] += exp(max(exponent[n, i] - top[i], LEAST))
-
-
-@njit
 def log_means(size, work):
     """Sum over a tile's samples of the log of the mean exponential, safe from over- and underflow.
 
     Appendix A of paper 2021.
     """
-    found, draws = 0.0, work.exponent.shape[0]
+    exponent, top, total = work.exponent, work.top, work.total
+    found, draws = 0.0, exponent.shape[0]
     if draws == 1:
         for i in range(size):
-            found += work.exponent[0, i]
+            found += exponent[0, i]
         return found
-    _exponentials(size, work)
     for i in range(size):
-        found += work.top[i]
-        if work.top[i] > -math.inf:
-            found += math.log(work.total[i] / draws)
+        top[i] = exponent[0, i]
+        total[i] = 0.0
+    for n in range(1, draws):
+        for i in range(size):
+            top[i] = max(top[i], exponent[n, i])
+    for n in range(draws):
+        for i in range(size):
+            # NaN passes max as its first argument, not as its second
+            total[i] += exp(max(exponent[n, i] - top[i], LEAST))
+    for i in range(size):
+        found += top[i]
+        if top[i] > -math.inf:
+            found += math.log(total[i] / draws)
     return found

@@ -27,19 +27,6 @@ class LikelihoodData(NamedTuple):
     ridge: np.ndarray  # (3,) prior precision of omega_dot (s^4/rad^2), zero where flat
 
 
-class Workspace(NamedTuple):
-    """Scratch memory of one chain."""
-
-    reduced: kernels.Reduced
-    tile: draws.Tile
-
-
-@njit
-def workspace(samples, count, rng):
-    """Allocate a `Workspace` for T samples and N = ``count`` draws, seeded by ``rng``."""
-    return Workspace(kernels.reduced(samples), draws.tile(count, rng))
-
-
 @njit
 def collapse(positions, data, out):
     """Everything that depends on theta but not on omega; returns log |H' Lambda H|."""
@@ -65,11 +52,6 @@ def _log_mean_exp(exponent):
 
 
 @njit
-def _assemble(total, const, logdet, determinant_power):
-    return total - 0.5 * const.sum() - determinant_power * const.size * logdet
-
-
-@njit
 def fixed_draws(positions, data, rates, power):
     """log p-hat (26a) on given draws ``rates`` (T, N, 3) rad/s."""
     found = kernels.reduced(rates.shape[0])
@@ -86,40 +68,42 @@ def fixed_draws(positions, data, rates, power):
             if weighted:
                 exponent[n] += draws.log_weight(data.log_weight, t, x, y, z)
         total += _log_mean_exp(exponent)
-    return _assemble(total, found.const, logdet, power)
+    return total - 0.5 * found.const.sum() - power * found.const.size * logdet
 
 
 @njit
-def fresh_draws(positions, data, work, power):
-    """log p-hat (26a) with omega drawn anew from p(omega | y_g)."""
-    found = work.reduced
-    logdet = collapse(positions, data, found)
-    total, tile = 0.0, work.tile
+def fresh_draws(positions, data, found, tile, power):
+    """log p-hat (26a) with omega drawn anew from p(omega | y_g).
+
+    ``found`` and ``tile`` are a chain's memory: a `Reduced` of the samples, and a `Tile`.
+    """
+    logdet, total = collapse(positions, data, found), 0.0
     draws.folded(found.C, tile.quartic)
     for start in range(0, data.energy.size, draws.TILE):
         size = min(draws.TILE, data.energy.size - start)
         numbers = draws.drawn(size, tile)
         draws.exponents(start, size, data, tile.quartic, found.b, numbers, tile.exponent)
         total += draws.log_means(size, tile)
-    return _assemble(total, found.const, logdet, power)
+    return total - 0.5 * found.const.sum() - power * found.const.size * logdet
 
 
 @njit
 def repeated(positions, data, rng, count, power, out):
     """Independent realisations of log p-hat at one theta, filling ``out``."""
     for i in range(out.size):
-        work = workspace(data.energy.size, count, rng)
-        out[i] = fresh_draws(positions, data, work, power)
+        found, tile = kernels.reduced(data.energy.size), draws.tile(count, rng)
+        out[i] = fresh_draws(positions, data, found, tile, power)
 
 
 @njit
-def transitions(theta, log_target, prior, step, draws, power, data, rng, count):
+def transitions(theta, log_target, prior, step, number, power, data, rng, count):
     """``count`` transitions of Algorithm 1 (2021) from ``theta`` (3 (A - 1),), in place.
 
     ``prior`` (2, 3 (A - 1)) holds means and precisions. The accepted noisy estimate is kept, never
-    redrawn. Proposals are the walk (27) of sd ``step``. Returns (accepted, log_target).
+    redrawn, of ``number`` draws of omega. Proposals are the walk (27) of sd ``step``. Returns
+    (accepted, log_target).
     """
-    work = workspace(data.energy.size, draws, rng)
+    found, tile = kernels.reduced(data.energy.size), draws.tile(number, rng)
     positions = np.zeros((theta.size // 3 + 1, 3))
     flat = positions.ravel()[3:]
     accepted = 0
@@ -128,7 +112,7 @@ def transitions(theta, log_target, prior, step, draws, power, data, rng, count):
         for i in range(theta.size):
             flat[i] = theta[i] + step * rng.standard_normal()
             proposed -= 0.5 * prior[1, i] * (flat[i] - prior[0, i]) ** 2
-        proposed += fresh_draws(positions, data, work, power)
+        proposed += fresh_draws(positions, data, found, tile, power)
         if math.log(rng.random()) < proposed - log_target:
             theta[:] = flat
             log_target = proposed

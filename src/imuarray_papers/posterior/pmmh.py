@@ -36,7 +36,6 @@ class PseudoMarginalMove(emcee.moves.Move):
 
     def propose(self, model, state):
         """Advance every chain; returns the new state and which chains moved at all."""
-        chains = len(state.coords)
 
         def advance(chain):
             rng = stream(self.seed, *self.names, "chain", chain, self.iteration)
@@ -46,12 +45,10 @@ class PseudoMarginalMove(emcee.moves.Move):
             )
             return theta, accepted, value
 
-        results = list(self.pool.map(advance, range(chains)))
+        results = self.pool.map(advance, range(len(state.coords)))
+        coords, counts, log_prob = map(np.array, zip(*results, strict=True))
         self.iteration += 1
-        counts = np.array([accepted for _, accepted, _ in results])
         self.accepted = self.accepted + counts
-        coords = np.array([theta for theta, _, _ in results])
-        log_prob = np.array([value for _, _, value in results])
         return emcee.State(coords, log_prob=log_prob), counts > 0
 
 

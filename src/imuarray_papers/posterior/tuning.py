@@ -49,18 +49,14 @@ def tune(
     may_centre : bool
         False: omega from p(omega | y_g), however large the variance.
     """
-
-    def variances(likelihood, positions):
-        return variance_sweep(
-            likelihood, positions, sweeps.draws, sweeps.realisations, rng("variance"), threads
-        )
-
-    first = found = variances(likelihood, positions)
+    sizes = sweeps.draws, sweeps.realisations
+    first = found = variance_sweep(likelihood, positions, *sizes, rng("variance"), threads)
     centred = may_centre and bool(found.min() > 2 * sweeps.variance)
     start = mode(centred)
     if centred:
-        likelihood = likelihood.centred(positions_of(start))
-        found = variances(likelihood, positions_of(start))
+        positions = positions_of(start)
+        likelihood = likelihood.centred(positions)
+        found = variance_sweep(likelihood, positions, *sizes, rng("variance"), threads)
     draws = choose_draws(sweeps.draws, found, sweeps.variance)
     target = CompiledTarget(likelihood, prior, draws)
     rates = acceptance_sweep(
@@ -114,11 +110,7 @@ def acceptance_sweep(
     target: CompiledTarget, start, steps, count: int, rng, threads: int = 1
 ) -> np.ndarray:
     """`acceptance` for each sigma_q in ``steps`` (metres), (len(steps),)."""
-
-    def one(step, own):
-        return acceptance(target, start, step, count, own)
-
-    return _each(one, steps, rng, threads)
+    return _each(lambda step, own: acceptance(target, start, step, count, own), steps, rng, threads)
 
 
 def choose_step(steps, rates, target: float = 0.18) -> float:

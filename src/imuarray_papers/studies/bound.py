@@ -16,7 +16,7 @@ from imuarray.motion import normal_motion, sphere_motion
 from imuarray.streams import stream
 from imuarray_papers.estimation.bcd import calibrate_bcd
 from imuarray_papers.studies.settings import SETTINGS
-from imuarray_papers.studies.truths import batches, realisations, root_mean_square, run_batches
+from imuarray_papers.studies.truths import in_batches, realisations, root_mean_square, run_batches
 
 
 def block_information(model: ArrayModel, motion) -> np.ndarray:
@@ -45,6 +45,15 @@ def rms_width(known) -> float:
     return float(np.sqrt(np.trace(np.linalg.inv(known)) / len(known)))
 
 
+def widths(model: ArrayModel, seed, names, samples: int, sizes, count: int) -> np.ndarray:
+    """`rms_width` (count,), m, for random motions of the magnitudes ``sizes``.
+
+    The motions are those of the streams (seed, names, number), the same with every model.
+    """
+    motions = (sphere_motion(stream(seed, *names, k), (samples,), *sizes) for k in range(count))
+    return np.array([rms_width(information_at(model, m, model.array.relative)) for m in motions])
+
+
 def _draw(model, rng, samples, motion, options):
     """(motion, truth, forces, rates, saturated) of a realisation."""
     made = realisations(model, rng, 1, samples, motion, options["position_sd"], options["rail"])
@@ -65,13 +74,12 @@ def efficiency(
     rows, model = [], replace(model, noise=model.noise.times(noise))
     for samples in sample_counts:
 
-        def job(batch, samples=samples):
-            number, size = batch
-            rng = stream(seed, "bound", samples, str(noise), number)
-            return [_one(model, rng, samples, motion, options) for _ in range(size)]
+        def batch(rng, size, samples=samples):
+            return [[_one(model, rng, samples, motion, options) for _ in range(size)]]
 
-        parts = run_batches(job, batches(options["realisations"]), threads, quiet, f"N={samples}")
-        found = np.concatenate(parts)  # (realisations, estimators, columns)
+        names = ("bound", samples, str(noise))
+        # (realisations, estimators, columns)
+        [found] = in_batches(batch, seed, names, options["realisations"], threads, quiet)
         for place, name in enumerate(("maximum likelihood", "with the prior")):
             square, bound, quadratic, iterations, converged = found[:, place].T
             rmse, error = root_mean_square(square)
@@ -162,9 +170,8 @@ def descents(model: ArrayModel, force, rate, saturated, limit: int = SETTINGS.bc
     bound = np.sqrt(np.trace(best.covariance) / len(best.covariance))
     if not best.converged:  # data that determine too little: there is no way to go
         return bound, np.nan, np.nan, np.nan
-    enough = bound * np.sqrt(
-        SETTINGS.near**2 - 1
-    )  # distance from the optimum, errors adding in squares
+    # distance from the optimum, errors adding in squares
+    enough = bound * np.sqrt(SETTINGS.near**2 - 1)
     marks = np.unique(np.geomspace(1, limit, 1000).astype(int))
     slow = calibrate_bcd(
         model, force, rate, saturated=saturated, tolerance=0.0, limit=limit, marks=marks
@@ -188,13 +195,9 @@ def against_size(model: ArrayModel, seed, samples, motion, factors, count=20) ->
         array = model.array
         scaled = Array(factor * array.positions, array.labels, array.gyroscopes, array.name)
         larger = ArrayModel(scaled, model.noise)
-        widths = []
-        for repeat in range(count):
-            rng = stream(seed, "bound", "size", repeat)
-            moves = sphere_motion(rng, (samples,), *motion)
-            widths.append(rms_width(information_at(larger, moves, scaled.relative)))
+        found = widths(larger, seed, ("bound", "size"), samples, motion, count)
         extent = float(np.linalg.norm(np.ptp(scaled.relative, axis=0)))
-        bound = float(np.sqrt(np.mean(np.square(widths))))
+        bound = float(np.sqrt(np.mean(np.square(found))))
         rows.append(
             {"factor": factor, "extent_m": extent, "bound_m": bound, "relative": bound / extent}
         )
@@ -217,6 +220,12 @@ def ranks(cases) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def isotropic(model: ArrayModel, accelerometer=1.0, gyroscope=1.0, array=None) -> ArrayModel:
+    """The model with its noise sds times two factors, of its array or of another."""
+    sds = model.noise.accelerometer[0, 0] ** 0.5, model.noise.gyroscope[0, 0] ** 0.5
+    return ArrayModel.isotropic(array or model.array, accelerometer * sds[0], gyroscope * sds[1])
+
+
 def geometries(model: ArrayModel) -> dict[str, ArrayModel]:
     """Other arrays with the noise of ``model``: fewer triads, all in one plane, half the size."""
     array, arrays = model.array, {}
@@ -226,8 +235,7 @@ def geometries(model: ArrayModel) -> dict[str, ArrayModel]:
             arrays[name] = replace(sub_array(array, count), name=name)
     for name, factor in (("all triads in one plane", [1.0, 1.0, 0.0]), ("half the size", 0.5)):
         arrays[name] = Array(array.positions * factor, array.labels, array.gyroscopes, name)
-    noise = model.noise.accelerometer[0, 0] ** 0.5, model.noise.gyroscope[0, 0] ** 0.5
-    return {name: ArrayModel.isotropic(other, *noise) for name, other in arrays.items()}
+    return {name: isotropic(model, array=other) for name, other in arrays.items()}
 
 
 def rank_cases(model: ArrayModel, seed, sphere, normal) -> list[tuple]:

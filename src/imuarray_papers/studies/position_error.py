@@ -1,5 +1,6 @@
 """RMSE of the calibrated positions, and its settings: paper 2017, figures 4 and 5."""
 
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -7,15 +8,8 @@ import pandas as pd
 
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.model import ArrayModel
-from imuarray.streams import stream
 from imuarray_papers.estimation.bcd import block_descent
-from imuarray_papers.studies.truths import (
-    batches,
-    realisations,
-    root_mean_square,
-    run_batches,
-    share,
-)
+from imuarray_papers.studies.truths import in_batches, realisations, root_mean_square
 
 
 def calibrate_batch(model, rng, count, case, options):
@@ -66,15 +60,11 @@ def realise(
     """
 
     def of(case):
-        def job(batch):
-            number, size = batch
-            return calibrate_batch(model, stream(seed, *case.names, number), size, case, options)
+        def batch(rng, size):
+            return calibrate_batch(model, rng, size, case, options)
 
-        mine = share(batches(options["realisations"]), part, parts)
-        label = "/".join(map(str, case.names))
-        made = run_batches(job, mine, threads, quiet, label)
-        empty = [(np.empty((0, len(options["marks"]))), np.empty(0, int), np.empty(0, int))]
-        return [np.concatenate(one) for one in zip(*(made or empty), strict=True)]
+        given = options["realisations"], threads, quiet, part, parts
+        return in_batches(batch, seed, case.names, *given)
 
     return Errors(*map(np.stack, zip(*map(of, cases), strict=True)))
 
@@ -125,27 +115,20 @@ def study(settings: dict, name: str) -> tuple[list[Case], dict]:
     """
     paper = settings["paper2017"]
     own = magnitudes(paper)
-    if name == "motion":  # whose rule is given figure 5's settings alone
-        marks = [paper["fig5_iterations"]]
-        motions = [
-            (np.radians(rate), np.radians(acceleration), own[2])
-            for acceleration in paper["fig5_accelerations_dps2"]
-            for rate in paper["fig5_rates_dps"]
-        ]
-    else:
-        marks = paper["fig4_iterations"]
-        motions = [(*own[:2], force) for force in FORCES]
     if name == "samples":
-        cases = [Case(("position", name, n), n, own) for n in paper["fig4_samples"]]
+        points = {count: (count, own) for count in paper["fig4_samples"]}
+        marks = sorted(paper["fig4_iterations"])
+    elif name == "motion":  # whose rule is given figure 5's settings alone
+        pairs = product(paper["fig5_accelerations_dps2"], paper["fig5_rates_dps"])
+        motions = [(np.radians(rate), np.radians(change), own[2]) for change, rate in pairs]
+        marks = [paper["fig5_iterations"]]
     else:
-        marks = [max(marks)]
-        cases = [
-            Case(("position", name, number), paper["fig5_samples"], motion)
-            for number, motion in enumerate(motions)
-        ]
-    return cases, {
+        motions, marks = [(*own[:2], force) for force in FORCES], [max(paper["fig4_iterations"])]
+    if name != "samples":
+        points = dict(enumerate((paper["fig5_samples"], motion) for motion in motions))
+    return [Case(("position", name, key), *point) for key, point in points.items()], {
         "realisations": settings["scale"]["realisations"],
-        "marks": sorted(marks),
+        "marks": marks,
         "position_sd": paper["position_sd"],
         "rail": np.radians(paper["gyroscope_range_dps"]),
         "tolerance": paper["tolerance"],

@@ -1,12 +1,14 @@
 """RMSE of the estimated motion when positions are wrong: paper 2017, figure 3."""
 
+from itertools import product
+
 import numpy as np
 import pandas as pd
 
 from imuarray.estimation.collapsed import estimate_motion
 from imuarray.model import ArrayModel
 from imuarray.streams import stream
-from imuarray_papers.studies.truths import batches, realisations, root_mean_square, run_batches
+from imuarray_papers.studies.truths import in_batches, realisations, root_mean_square
 
 
 def square_errors(model, rng, count, motion, position_sd, rail, gyroscopes: bool = True):
@@ -35,28 +37,25 @@ def rmse_against_rate(
 ) -> pd.DataFrame:  # fmt: skip
     """Figure 3: RMSE of the motion for each |omega| (rad/s) and position error sd (m)."""
     rows = []
-    for position_sd in position_sds:
-        for number, rate in enumerate(rates):
-            names = ("rate", f"{position_sd:g}", number)
-            motion = (rate, angular_acceleration, specific_force)
+    for position_sd, (number, rate) in product(position_sds, enumerate(rates)):
+        sizes = (rate, angular_acceleration, specific_force)
 
-            def job(batch, names=names, motion=motion, sd=position_sd):
-                rng = stream(seed, *names, batch[0])
-                return square_errors(model, rng, batch[1], motion, sd, rail)
+        def batch(rng, size, sizes=sizes, sd=position_sd):
+            return square_errors(model, rng, size, sizes, sd, rail)
 
-            parts = run_batches(job, batches(realisations), threads, True, "rate")
-            array, gyroscopes, acceleration, force, converged = (
-                np.concatenate(part) for part in zip(*parts, strict=True)
-            )
-            row = {"angular_rate_dps": np.degrees(rate), "position_sd_m": position_sd}
-            for name, squares in (("array", array), ("gyroscopes", gyroscopes)):
-                rmse, error = root_mean_square(squares)
-                row[f"{name}_rmse_dps"], row[f"{name}_rmse_se_dps"] = np.degrees([rmse, error])
-            row["acceleration_rmse_dps2"] = np.degrees(root_mean_square(acceleration)[0])
-            row["specific_force_rmse_mps2"] = root_mean_square(force)[0]
-            row["converged_share"] = float(converged.mean())
-            row["realisations"] = realisations
-            rows.append(row)
+        names = ("rate", f"{position_sd:g}", number)
+        array, gyroscopes, acceleration, force, converged = in_batches(
+            batch, seed, names, realisations, threads
+        )
+        row = {"angular_rate_dps": np.degrees(rate), "position_sd_m": position_sd}
+        for name, squares in (("array", array), ("gyroscopes", gyroscopes)):
+            rmse, error = root_mean_square(squares)
+            row[f"{name}_rmse_dps"], row[f"{name}_rmse_se_dps"] = np.degrees([rmse, error])
+        row["acceleration_rmse_dps2"] = np.degrees(root_mean_square(acceleration)[0])
+        row["specific_force_rmse_mps2"] = root_mean_square(force)[0]
+        row["converged_share"] = float(converged.mean())
+        row["realisations"] = realisations
+        rows.append(row)
     return pd.DataFrame(rows)
 
 
@@ -69,19 +68,18 @@ def accelerometers_only(
     """
     average = np.sqrt(model.noise.gyroscope[0, 0] / model.array.gyroscopes)
     rows = []
-    for position_sd in position_sds:
-        for number, rate in enumerate(rates):
-            rng = stream(seed, "accelerometers only", f"{position_sd:g}", number)
-            sizes = (rate, angular_acceleration, specific_force)
-            squares, _, acceleration, *_ = square_errors(
-                model, rng, count, sizes, position_sd, np.inf, gyroscopes=False
-            )
-            rmse, error = root_mean_square(squares)
-            rows.append({
-                "angular_rate_dps": np.degrees(rate), "position_sd_m": position_sd,
-                "rmse_dps": np.degrees(rmse), "rmse_se_dps": np.degrees(error),
-                "gyroscopes_average_dps": np.degrees(average),
-                "acceleration_rmse_dps2": np.degrees(root_mean_square(acceleration)[0]),
-                "realisations": count,
-            })  # fmt: skip
+    for position_sd, (number, rate) in product(position_sds, enumerate(rates)):
+        rng = stream(seed, "accelerometers only", f"{position_sd:g}", number)
+        sizes = (rate, angular_acceleration, specific_force)
+        squares, _, acceleration, *_ = square_errors(
+            model, rng, count, sizes, position_sd, np.inf, gyroscopes=False
+        )
+        rmse, error = root_mean_square(squares)
+        rows.append({
+            "angular_rate_dps": np.degrees(rate), "position_sd_m": position_sd,
+            "rmse_dps": np.degrees(rmse), "rmse_se_dps": np.degrees(error),
+            "gyroscopes_average_dps": np.degrees(average),
+            "acceleration_rmse_dps2": np.degrees(root_mean_square(acceleration)[0]),
+            "realisations": count,
+        })  # fmt: skip
     return pd.DataFrame(rows)

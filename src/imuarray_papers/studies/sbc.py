@@ -8,6 +8,7 @@ neither the noise nor the size of the motion.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -37,19 +38,23 @@ def names_of(setting: Setting) -> list[str]:
 
 def of_draws(setting: Setting, made, draws, name: str) -> np.ndarray:
     """PIT values (R, P + 2) of the truths among draws (R, L, P), uniform between two draws."""
-    out, nominal = [], setting.prior.mean
+    out = []
     for one, thetas in zip(made, draws, strict=True):
         both = np.vstack([one.truth, thetas])
         misfits = [misfit(one.likelihood, theta) for theta in both]
-        along = both @ nominal / np.linalg.norm(nominal)
-        values = np.column_stack([both, along, misfits])
-        rng = stream(setting.seed, "calibrated", name, setting.name, setting.samples, one.number)
-        out.append(_pit(values, rng))
+        rng = stream(setting.seed, *setting.where(name), one.number)
+        out.append(_pit(setting, both, rng, misfits))
     return np.array(out)
 
 
-def _pit(values, rng) -> np.ndarray:
-    """Where the first of ``values`` (L + 1, Q) lies among the others, (Q,) in (0, 1)."""
+def _pit(setting: Setting, both, rng, *more) -> np.ndarray:
+    """Where the first of ``both`` (L + 1, P) lies among the others, (Q,) in (0, 1).
+
+    By coordinate and effect, along the array's nominal shape, and by ``more`` numbers (L + 1,).
+    """
+    nominal = setting.prior.mean
+    along = both[:, : nominal.size] @ nominal / np.linalg.norm(nominal)
+    values = np.column_stack([both, along, *more])
     rank = np.sum(values[1:] < values[0], axis=0)
     return (rank + rng.random(rank.size)) / len(values)
 
@@ -76,8 +81,7 @@ def ml(setting: Setting, made, threads: int = 1) -> Found:
 
 
 def _start(setting: Setting, one: Replicate, name: str) -> np.ndarray:
-    where = setting.name, setting.samples, one.number
-    rng = stream(setting.seed, "calibrated", name, "start", *where)
+    rng = stream(setting.seed, *setting.where(name, "start"), one.number)
     return rng.multivariate_normal(one.mode, SETTINGS.apart**2 * one.covariance)
 
 
@@ -87,7 +91,6 @@ def nuts(setting: Setting, made, threads: int = 1) -> Found:
     from imuarray.posterior.nuts import run_nuts
 
     prior, name = setting.prior, "nuts"
-    where = setting.seed, "calibrated", name, setting.name, setting.samples
 
     def chain(one):
         found = one.likelihood.marginal(positions_of(one.mode), count)
@@ -95,7 +98,7 @@ def nuts(setting: Setting, made, threads: int = 1) -> Found:
         steps = SETTINGS.draws * SETTINGS.spacing
         return run_nuts(
             log_posterior, one.mode, one.covariance, start, SETTINGS.warmup, steps, setting.seed,
-            (*where[1:], one.number), SETTINGS.warmup + steps, True,
+            (*setting.where(name), one.number), SETTINGS.warmup + steps, True,
             (found.data, found.nodes, found.log_weights, None, prior.mean, prior.sd), 1,
         ).draws[0]  # fmt: skip
 
@@ -113,7 +116,7 @@ def pmmh(setting: Setting, made, threads: int = 1) -> Found:
     But N at the mode: here the prior's mean is as far off as the prior says, not a thirtieth of it.
     """
     name = "walk"
-    rng = stream(setting.seed, "calibrated", name, "pilot", setting.name, setting.samples)
+    rng = stream(setting.seed, *setting.where(name, "pilot"))
     pilot = replicate(setting, SETTINGS.spare)
     steps = np.sqrt(np.diag(pilot.covariance)).mean() * np.geomspace(1e-3, 3.0, 12)
     found = tuning.tune(
@@ -129,8 +132,7 @@ def pmmh(setting: Setting, made, threads: int = 1) -> Found:
     thin = _thinning(target(pilot), theta, found.step, rng)
 
     def chain(one):
-        where = setting.name, setting.samples, one.number
-        own = stream(setting.seed, "calibrated", name, "chain", *where)
+        own = stream(setting.seed, *setting.where(name, "chain"), one.number)
         theta = _start(setting, one, name)
         value = _burnt_in(target(one), theta, found.step, max(SETTINGS.first, thin // 4), own)
         return _kept(SETTINGS.draws, target(one), theta, value, found.step, thin, own)[0]
@@ -180,9 +182,7 @@ def pit_values(
 
     ``replicates``: their numbers; what one gives does not depend on the others.
     """
-    made = run_batches(
-        lambda number: replicate(setting, number), replicates, threads, True, "replicates"
-    )
+    made = run_batches(partial(replicate, setting), replicates, threads, True, "replicates")
     names, frames = names_of(setting), []
     for method in methods:
         found = METHODS[method](setting, made, threads)
@@ -203,7 +203,7 @@ def _table(setting: Setting, method: str, replicates, names, pit, independent) -
 
 def drawn(setting: Setting, number: int) -> tuple[np.ndarray, Recording]:
     """Truth (P,) ``number``: positions and effects from their priors; what was measured of it."""
-    rng = stream(setting.seed, "calibrated", METHOD, setting.name, setting.samples, number)
+    rng = stream(setting.seed, *setting.where(METHOD), number)
     model, prior = setting.model, setting.prior
     positions = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
     effects = model.effect_prior_sd * rng.standard_normal(model.effect_size)
@@ -224,19 +224,16 @@ def pit_values_by_default(
 
     Coordinates, the effects' parameters, and the array's size along its nominal shape.
     """
-    size = setting.prior.mean / np.linalg.norm(setting.prior.mean)
-    names = names_of(setting)[: size.size]
-    names += [f"effect_{place}" for place in range(setting.model.effect_size)]
+    coordinates = names_of(setting)[: setting.prior.mean.size]
+    names = coordinates + [f"effect_{place}" for place in range(setting.model.effect_size)]
 
     def one(number: int) -> Found:
         truth, recording = drawn(setting, number)
         tree = sample(recording, seed=number, effects=setting.model.effects)
         draws = chains_of(tree).draws[..., : len(names)]
         both = np.vstack([truth, draws.reshape(-1, len(names))])
-        both = np.column_stack([both, both[:, : size.size] @ size])
-        where = setting.name, setting.samples, number
-        pit = _pit(both, stream(setting.seed, "calibrated", METHOD, "rank", *where))
-        return pit, ess(draws).min()
+        rng = stream(setting.seed, *setting.where(METHOD, "rank"), number)
+        return _pit(setting, both, rng), ess(draws).min()
 
     found = run_batches(one, list(replicates), threads, True, METHOD)
     pit, independent = map(np.array, zip(*found, strict=True))

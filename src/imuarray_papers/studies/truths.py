@@ -55,6 +55,10 @@ class Setting(NamedTuple):
         """Prior of r_2 ... r_A, around the nominal ones."""
         return GaussianPrior.of(self.model.array.parameters, self.prior_sd)
 
+    def where(self, *names) -> tuple:
+        """The names of a random stream of this simulation."""
+        return "calibrated", *names, self.name, self.samples
+
 
 def setting_from(settings: dict, name: str, samples: int) -> Setting:
     """Setting from ``validation.settings`` of a configuration; motion and prior: ``paper2021``.
@@ -100,7 +104,7 @@ def misfit(likelihood: Likelihood, theta) -> float:
 
 def replicate(setting: Setting, number: int) -> Replicate:
     """Number ``number``: the same for all samplers."""
-    rng = stream(setting.seed, "calibrated", setting.name, setting.samples, number)
+    rng = stream(setting.seed, *setting.where(), number)
     model, prior = setting.model, setting.prior
     truth = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
     motion = normal_motion(rng, (setting.samples,), *setting.motion_sd)
@@ -145,17 +149,33 @@ def run_batches(function, jobs, threads: int, quiet: bool, label: str) -> list:
         return list(tqdm(results, total=len(jobs), disable=quiet, desc=label, mininterval=15.0))
 
 
-def batches(realisations: int):
-    """(number, size) of each batch."""
-    full, rest = divmod(realisations, SETTINGS.batch)
-    return [(i, SETTINGS.batch) for i in range(full)] + ([(full, rest)] if rest else [])
-
-
 def share(jobs, part: int, parts: int) -> list:
     """The jobs of one of ``parts`` neighbouring shares, as even as may be."""
     jobs = list(jobs)
     ends = [len(jobs) * number // parts for number in (part, part + 1)]
     return jobs[slice(*ends)]
+
+
+def in_batches(
+    function, seed, names, count: int, threads: int = 1, quiet: bool = True, part=0, parts=1
+) -> list[np.ndarray]:
+    """Arrays that ``function`` (rng, size) gives of batches of ``count`` realisations, joined.
+
+    Each batch has the random stream (seed, names, its number): none depends on the others, and one
+    of ``parts`` shares of them may be made alone.
+    """
+    sizes = [SETTINGS.batch] * (count // SETTINGS.batch)
+    sizes += [rest] if (rest := count % SETTINGS.batch) else []
+
+    def job(batch):
+        number, size = batch
+        return function(stream(seed, *names, number), size)
+
+    jobs = share(enumerate(sizes), part, parts)
+    # of an empty share one realisation, for what its arrays look like
+    made = run_batches(job, jobs or [(0, 1)], threads, quiet, "/".join(map(str, names)))
+    count = sum(size for _, size in jobs)
+    return [np.concatenate(one)[:count] for one in zip(*made, strict=True)]
 
 
 def root_mean_square(squares) -> tuple[float, float]:

@@ -61,12 +61,11 @@ def log_gram_gradient(theta, precision) -> np.ndarray:
 
 def log_gram_hessian(theta, precision, step=1e-6) -> np.ndarray:
     """Second derivative of log |H' Lambda H|, by central differences of the gradient."""
-    rows = []
-    for i in range(theta.size):
-        shift = np.zeros(theta.size)
-        shift[i] = step
-        up, down = (log_gram_gradient(theta + s * shift, precision) for s in (1, -1))
-        rows.append((up - down) / (2 * step))
+    rows = [
+        (log_gram_gradient(theta + shift, precision) - log_gram_gradient(theta - shift, precision))
+        / (2 * step)
+        for shift in step * np.eye(theta.size)
+    ]
     return 0.5 * (np.array(rows) + np.array(rows).T)
 
 

@@ -15,19 +15,13 @@ from imuarray.motion import Motion, hand_twisting, normal_motion, sphere_motion
 from imuarray.recording import Recording
 from imuarray.simulation.recordings import measure
 from imuarray.streams import stream
-from imuarray_papers.studies.bound import rms_width
+from imuarray_papers.studies.bound import isotropic, rms_width, widths
 from imuarray_papers.studies.checks.identifiability import motion_jacobian
 
 REPEATS = 20  # motions averaged over
 OFF = 1e-3  # m, sd by which positions are off at the start
 MOVING = np.radians(100.0)  # rad/s, from which a sample is one of twisting
 SIZES = "angular rate", "angular acceleration", "specific force"
-
-
-def _isotropic(model: ArrayModel, accelerometer=1.0, gyroscope=1.0, array=None) -> ArrayModel:
-    """The model with its noise sds times two factors, of its array or of another."""
-    sds = model.noise.accelerometer[0, 0] ** 0.5, model.noise.gyroscope[0, 0] ** 0.5
-    return ArrayModel.isotropic(array or model.array, accelerometer * sds[0], gyroscope * sds[1])
 
 
 def dependence(model: ArrayModel, seed, samples: int, sizes) -> pd.DataFrame:
@@ -40,28 +34,22 @@ def dependence(model: ArrayModel, seed, samples: int, sizes) -> pd.DataFrame:
     array = model.array
     flat = array.positions * [1.0, 1.0, 0.5]
     models = {
-        "noise of the gyroscopes": _isotropic(model, gyroscope=2.0),
-        "noise of the accelerometers": _isotropic(model, accelerometer=2.0),
-        "size": _isotropic(model, array=replace(array, positions=array.positions / 2)),
-        "thickness": _isotropic(model, array=replace(array, positions=flat)),
-        "IMUs": _isotropic(model, array=sub_array(array, array.accelerometers // 2)),
-        "one gyroscope": _isotropic(model, array=replace(array, gyroscopes=1)),
+        "noise of the gyroscopes": isotropic(model, gyroscope=2.0),
+        "noise of the accelerometers": isotropic(model, accelerometer=2.0),
+        "size": isotropic(model, array=replace(array, positions=array.positions / 2)),
+        "thickness": isotropic(model, array=replace(array, positions=flat)),
+        "IMUs": isotropic(model, array=sub_array(array, array.accelerometers // 2)),
+        "one gyroscope": isotropic(model, array=replace(array, gyroscopes=1)),
     }
     changes = {name: (changed, np.ones(3)) for name, changed in models.items()}
     changes |= {name: (model, 1.0 - np.eye(3)[k] / 2) for k, name in enumerate(SIZES)}
 
-    def widths(changed, factors):
-        return [
-            rms_width(information_at(
-                changed,
-                sphere_motion(stream(seed, "dependence", r), (samples,), *(sizes * factors)),
-                changed.array.relative,
-            )) for r in range(REPEATS)
-        ]  # fmt: skip
+    def found(changed, factors):
+        return widths(changed, seed, ("dependence",), samples, sizes * factors, REPEATS)
 
-    plain, rows = np.array(widths(model, np.ones(3))), []
+    plain, rows = found(model, np.ones(3)), []
     for name, change in changes.items():
-        factor = widths(*change) / plain
+        factor = found(*change) / plain
         rows.append((name, factor.mean(), factor.std(ddof=1) / np.sqrt(REPEATS)))
     return pd.DataFrame(rows, columns=["change", "factor", "factor_se"])
 
