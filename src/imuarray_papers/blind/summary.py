@@ -60,8 +60,7 @@ def recordings(rows: list[dict]) -> pd.DataFrame:
         line |= {"named": bool(row["causes"]), "wrong": bool(row["wrong_names"])}
         for name in ("found", "sensors_right"):
             line[name] = all(effect[name] for effect in truth)
-        for name in ("position_rmse_m", "covered", "coordinates"):
-            line[name] = None if row["crash"] else row["extended"][name]
+        line |= row["extended"] or dict.fromkeys(("position_rmse_m", "covered", "coordinates"))
         line |= {"seconds": row["seconds"], "cpu_seconds": row["cpu_seconds"]}
         # either is an upper limit of what it takes where nothing else runs
         line["least_seconds"] = min(row["seconds"], row["cpu_seconds"])

@@ -67,17 +67,15 @@ def independent(draws) -> np.ndarray:
 def ml(setting: Setting, made, threads: int = 1) -> Found:
     """Under a normal density around the ML estimate; NaN of the misfit, and where there is none."""
     size = setting.prior.mean / np.linalg.norm(setting.prior.mean)
-    out = []
-    for one in made:
-        away, sd = one.truth - one.ml, np.sqrt(np.diag(one.ml_covariance))
-        along = size @ away / np.sqrt(size @ one.ml_covariance @ size)
-        # 0 and 1 themselves have no normal score
-        found = [
-            *np.clip(stats.norm.cdf([*away / sd, along]), SETTINGS.tiny, 1 - SETTINGS.tiny),
-            np.nan,
-        ]
-        out.append(found if one.ml_converged else [np.nan] * len(found))
-    return np.array(out), np.full(len(out), np.nan)
+    out = np.full((len(made), size.size + 2), np.nan)
+    for row, one in zip(out, made, strict=True):
+        if one.free is not None and one.free.converged:
+            away, covariance = one.truth - one.free.positions[1:].ravel(), one.free.covariance
+            along = size @ away / np.sqrt(size @ covariance @ size)
+            found = stats.norm.cdf([*away / np.sqrt(np.diag(covariance)), along])
+            # 0 and 1 themselves have no normal score
+            row[:-1] = np.clip(found, SETTINGS.tiny, 1 - SETTINGS.tiny)
+    return out, np.full(len(out), np.nan)
 
 
 def _start(setting: Setting, one: Replicate, name: str) -> np.ndarray:

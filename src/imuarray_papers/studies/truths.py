@@ -7,6 +7,7 @@ import numpy as np
 from tqdm import tqdm
 
 from imuarray.errors import IdentifiabilityError
+from imuarray.estimation.identifiability import Calibration
 from imuarray.estimation.newton import fisher_scoring
 from imuarray.geometry import positions_of, sub_array
 from imuarray.model import ArrayModel
@@ -87,9 +88,7 @@ class Replicate(NamedTuple):
     likelihood: Likelihood  # with the motion's own prior
     mode: np.ndarray  # (P,)
     covariance: np.ndarray  # (P, P)
-    ml: np.ndarray  # (P,) the most likely positions without a prior
-    ml_covariance: np.ndarray  # (P, P) and what their information says of them
-    ml_converged: bool
+    free: Calibration | None  # the most likely without a prior; None where they are not determined
 
 
 def misfit(likelihood: Likelihood, theta) -> float:
@@ -111,13 +110,11 @@ def replicate(setting: Setting, number: int) -> Replicate:
     force, rate, _ = measure(model, motion, positions_of(truth), rng)
     likelihood = Likelihood.of(model, force, rate, motion_sd=setting.motion_sd[:2])
     best = _most_likely(setting, likelihood, rng)
-    mode = best.positions[1:].ravel()
     try:
-        found = fisher_scoring(likelihood.collapsed, best.positions)
-        free = found.positions[1:].ravel(), found.covariance, found.converged
+        free = fisher_scoring(likelihood.collapsed, best.positions)
     except IdentifiabilityError:
-        free = np.full(mode.size, np.nan), np.full((mode.size,) * 2, np.nan), False
-    return Replicate(number, truth, likelihood, mode, best.covariance, *free)
+        free = None
+    return Replicate(number, truth, likelihood, best.positions[1:].ravel(), best.covariance, free)
 
 
 def _most_likely(setting: Setting, likelihood: Likelihood, rng):
