@@ -12,7 +12,7 @@ from imuarray.model import ArrayModel, structure_tensor
 from imuarray.posterior.marginal import Marginal
 from imuarray.posterior.prior import GaussianPrior
 from imuarray_papers.posterior import kernels
-from imuarray_papers.posterior.proposals import WIDENING, log_weights, proposals
+from imuarray_papers.posterior.proposals import log_weights, proposals
 
 # (19) and (23) imply |H' Lambda H|^(-1/2) for each sample; (25) and (26a) print the
 # determinant without the root. "derived" is right; "printed" exists to show the difference.
@@ -74,20 +74,16 @@ class Likelihood:
         rates = self.rate_mean, self.rate_covariance
         return Marginal.of(self.collapsed, positions, rates, self.motion_sd, nodes)
 
-    def centred(self, positions, widening: float = WIDENING) -> Self:
+    def centred(self, positions) -> Self:
         """The likelihood estimated with draws from where its integrand is.
 
         omega_t is drawn around the integrand's mode at ``positions`` (A, 3) m, weighted by
         p(omega_t | y_g) over that density: unbiased at every theta, and of far smaller
         variance than (26a) where p(omega_t | y_g) is wide or lies off, as in measured data.
-        Drawn so many times as wide as the integrand's curvature says, which alone gives log p-hat
-        a variance of some 6 (widening - 1)^2 / N a sample.
         """
-        centre = self._relative(positions)
-        mean, covariance = proposals(
-            self.collapsed, self.rate_mean, self.rate_covariance, centre, widening
-        )
-        weights = log_weights(self.rate_mean, self.rate_covariance, mean, covariance)
+        rates = self.rate_mean, self.rate_covariance
+        mean, covariance = proposals(self.collapsed, *rates, self._relative(positions))
+        weights = log_weights(*rates, mean, covariance)
         data = self.data._replace(
             mean=np.ascontiguousarray(mean.T), factor=_lower(covariance), log_weight=weights
         )

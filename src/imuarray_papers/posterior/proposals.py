@@ -8,7 +8,8 @@ from imuarray.model.structure import CURVATURES, PAIRS, product_slopes, products
 from imuarray.recording import Recording
 
 FEWEST = 4  # gyroscopes for a covariance (3, 3) of full rank
-# Wider than the curvature at the mode says, so that no weight is without bound in practice.
+# Of draws, times what the curvature at the mode says, so that no weight is without bound in
+# practice; it alone gives log p-hat a variance of some 6 (WIDENING - 1)^2 / N a sample.
 WIDENING = 1.05
 
 
@@ -36,7 +37,7 @@ def rate_distribution(recording: Recording):
     return rate.mean(axis=1), np.broadcast_to(covariance, (len(rate), 3, 3))
 
 
-def proposals(collapsed: Collapsed, mean, covariance, positions, widening: float = WIDENING):
+def proposals(collapsed: Collapsed, mean, covariance, positions):
     """Mean (T, 3) rad/s and covariance (T, 3, 3) of a normal density like the integrand.
 
     The integrand is p(omega_t | y_g) = N(``mean``, ``covariance``) times the exponential of
@@ -52,7 +53,7 @@ def proposals(collapsed: Collapsed, mean, covariance, positions, widening: float
     # far from a good fit the second derivative may not be positive: then the first order serves
     sound = np.linalg.eigvalsh(full)[:, 0] > 0.1 * np.linalg.eigvalsh(curvature)[:, 0]
     curvature[sound] = full[sound]
-    return rate, widening**2 * np.linalg.inv(curvature)
+    return rate, WIDENING**2 * np.linalg.inv(curvature)
 
 
 def log_weights(mean, covariance, proposal_mean, proposal_covariance) -> np.ndarray:
