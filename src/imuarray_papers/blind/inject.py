@@ -274,16 +274,15 @@ def outside_quantisation(scene, rng, sensors, size):
     """Readings rounded to multiples of an LSB of ``size`` times the declared noise."""
     kinds = which_kinds(rng)
 
-    def rounding(step, limit):
-        def coarse(values):
-            rounded = np.clip(step * np.round(values / step), -limit, limit)
-            # the rail itself is a code
-            return np.where(np.abs(values) >= limit, values, rounded)
+    def coarse(values, step, limit):
+        rounded = np.clip(step * np.round(values / step), -limit, limit)
+        # the rail itself is a code
+        return np.where(np.abs(values) >= limit, values, rounded)
 
-        return coarse
-
-    steps = zip(scene.noise, scene.limits, kinds, strict=True)
-    rules = [rounding(size * sd, limit) if chosen else None for sd, limit, chosen in steps]
+    rules = [
+        partial(coarse, step=size * sd, limit=limit) if chosen else None
+        for sd, limit, chosen in zip(scene.noise, scene.limits, kinds, strict=True)
+    ]
     said = {"lsb_in_noise_sd": Parameter(size), "of": kind_names(kinds)}
     return {"parameters": said, "after": altered(sensors, Pair(*rules))}
 

@@ -56,8 +56,9 @@ def widths(model: ArrayModel, seed, names, samples: int, sizes, count: int) -> n
 
 def _draw(model, rng, samples, motion, options):
     """(motion, truth, forces, rates, saturated) of a realisation."""
-    made = realisations(model, rng, 1, samples, motion, options["position_sd"], options["rail"])
-    return made.motion.select(0), *(part[0] for part in made[1:])
+    given = options["position_sd"], options["rail"]
+    moves, *rest = realisations(model, rng, 1, samples, motion, *given)
+    return moves.select(0), *(part[0] for part in rest)
 
 
 def efficiency(

@@ -18,21 +18,18 @@ def calibrate_batch(model, rng, count, case, options):
     Returns mean squared position errors (count, marks) in m^2, iterations (count,) and the
     kernel's status (count,): 1 converged, 0 limit, negative not identifiable (NaN errors).
     """
-    given = options["position_sd"], options["rail"]
-    made = realisations(model, rng, count, case.samples, case.motion, *given)
-    marks = np.asarray(options["marks"], np.int64)
-    squares = np.full((count, len(marks)), np.nan)
-    iterations, status = np.zeros(count, int), np.zeros(count, int)
-    for i in range(count):
-        data = Collapsed.of(model, made.force[i], made.rate[i], made.saturated[i])
-        positions = model.array.relative.copy()
-        status[i], cost, _, snapshots = block_descent(
+    _, truth, *readings = realisations(
+        model, rng, count, case.samples, case.motion, options["position_sd"], options["rail"]
+    )
+    marks, found = np.asarray(options["marks"], np.int64), []
+    for place, *one in zip(truth, *readings, strict=True):
+        data, positions = Collapsed.of(model, *one), model.array.relative.copy()
+        status, cost, _, snapshots = block_descent(
             data.arrays, positions, options["tolerance"], max(options["marks"]), marks
         )
-        iterations[i] = len(cost)
-        if status[i] >= 0:
-            squares[i] = np.mean((snapshots - made.truth[i])[:, 1:] ** 2, axis=(1, 2))
-    return squares, iterations, status
+        squares = np.mean((snapshots - place)[:, 1:] ** 2, axis=(1, 2))
+        found.append((squares if status >= 0 else np.nan * squares, len(cost), status))
+    return [np.array(part) for part in zip(*found, strict=True)]
 
 
 class Case(NamedTuple):

@@ -11,7 +11,7 @@ from imuarray.estimation.identifiability import Calibration
 from imuarray.estimation.newton import fisher_scoring
 from imuarray.geometry import positions_of, sub_array
 from imuarray.model import ArrayModel
-from imuarray.motion import Motion, normal_motion, sphere_motion
+from imuarray.motion import normal_motion, sphere_motion
 from imuarray.posterior.prior import GaussianPrior
 from imuarray.simulation.recordings import measure
 from imuarray.streams import stream
@@ -20,25 +20,17 @@ from imuarray_papers.posterior.likelihood import Likelihood
 from imuarray_papers.studies.settings import SETTINGS
 
 
-class Realisations(NamedTuple):
-    """R times N samples of random motion, and what is measured of it; see `measure`."""
+def realisations(model: ArrayModel, rng, count, samples, motion, position_sd, rail) -> tuple:
+    """Random `Motion` of ``count`` arrays, fields (R, N, 3), and what `measure` gives of it.
 
-    motion: Motion  # fields (R, N, 3)
-    truth: np.ndarray  # (R, A, 3) m relative to the reference
-    force: np.ndarray
-    rate: np.ndarray
-    saturated: np.ndarray
-
-
-def realisations(model: ArrayModel, rng, count, samples, motion, position_sd, rail) -> Realisations:
-    """``count`` arrays, each triad off its nominal position by ``position_sd`` (m), in motion.
-
-    ``motion``: magnitudes of `sphere_motion`; ``rail`` (rad/s) of the gyroscopes.
+    Between them the truth: positions (R, A, 3) m relative to the reference, each triad off its
+    nominal position by ``position_sd`` (m). ``motion``: magnitudes of `sphere_motion`; ``rail``
+    (rad/s) of the gyroscopes.
     """
     errors = position_sd * rng.standard_normal((count, model.array.accelerometers, 3))
     truth = model.array.relative + errors - errors[:, :1]
     moves = sphere_motion(rng, (count, samples), *motion)
-    return Realisations(moves, truth, *measure(model, moves, truth, rng, gyroscope_range=rail))
+    return moves, truth, *measure(model, moves, truth, rng, gyroscope_range=rail)
 
 
 class Setting(NamedTuple):
