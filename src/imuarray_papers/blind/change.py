@@ -152,11 +152,6 @@ def entries(rng, sensors, size) -> np.ndarray:
     return size * rng.standard_normal((len(sensors), 3))
 
 
-def matrices(rng, sensors, size) -> np.ndarray:
-    """Normal matrices with entries of sd ``size``, (n, 3, 3)."""
-    return size * rng.standard_normal((len(sensors), 3, 3))
-
-
 def error_of(
     name: str, kind: str, parameter: str, unit: str, low: float, high: float, error: Callable,
     draw: Callable = entries, **entry,
@@ -216,11 +211,6 @@ def altered(sensors, rules: Pair) -> Callable[[Pair], Pair]:
         return Pair(*found)
 
     return change
-
-
-def applied(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Matrices (n, 3, 3) times vectors (T, n, 3)."""
-    return np.einsum("kij,tkj->tki", matrices, vectors)
 
 
 def mean_readings(scene: Scene, changes: Sequence[Change]) -> Pair:

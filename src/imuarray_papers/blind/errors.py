@@ -14,12 +14,10 @@ from imuarray_papers.blind.change import (
     UNITS,
     Parameter,
     altered,
-    applied,
     effect,
     entries,
     error_of,
     kind_names,
-    matrices,
     of_kinds,
     spread,
     which_kinds,
@@ -33,6 +31,16 @@ DRIFTS = 0.1, 0.3 * DEGREE
 UNLIKE = 0.04  # of an axis' place in its chip, from one chip to the other: 15 of 360 um
 WARMING = 0.05, 0.1 * DEGREE  # the same of a board that warms up
 COMMON = {"everywhere": True, "scalable": False}
+
+
+def applied(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Matrices (n, 3, 3) times vectors (T, n, 3)."""
+    return np.einsum("kij,tkj->tki", matrices, vectors)
+
+
+def matrices(rng, sensors, size) -> np.ndarray:
+    """Normal matrices with entries of sd ``size``, (n, 3, 3)."""
+    return size * rng.standard_normal((len(sensors), 3, 3))
 
 
 def _off_diagonal(rng, sensors, size) -> np.ndarray:

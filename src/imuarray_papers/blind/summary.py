@@ -129,9 +129,9 @@ class Criterion(NamedTuple):
     kinds : tuple of str
         Kinds of cases that it is about.
     hit : str
-        Column of `recordings` that says what is counted; `COVERED`:
-        the mean share of intervals instead. A crash has a criterion of its own: it is a miss where
-        the share must be large, else left out.
+        Column of `recordings` that says what is counted; `COVERED`: the mean share of intervals
+        instead. A crash has a criterion of its own: it is a miss where the share must be large,
+        else left out.
     aim : tuple of two floats, or None
         Lowest and highest share that will do; None for what is counted without a limit.
     size : tuple of str and float, or None
@@ -202,8 +202,7 @@ CRITERIA = (
             f"coverage_{name}", f"95 % intervals of the extended model cover: {words}", kinds,
             COVERED, (0.92, 0.98),
         )
-        for name, words, kinds in (*((kind, kind, (kind,)) for kind in KINDS),
-                                   ("all", "all sets", KINDS))
+        for name, words, kinds in [*((k, k, (k,)) for k in KINDS), ("all", "all sets", KINDS)]
     ),
 )  # fmt: skip
 
