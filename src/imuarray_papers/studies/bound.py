@@ -229,14 +229,11 @@ def isotropic(model: ArrayModel, accelerometer=1.0, gyroscope=1.0, array=None) -
 
 def geometries(model: ArrayModel) -> dict[str, ArrayModel]:
     """Other arrays with the noise of ``model``: fewer triads, all in one plane, half the size."""
-    array, arrays = model.array, {}
-    for count in (3, 4, 8):
-        if count < array.accelerometers:
-            name = f"{count} triads"
-            arrays[name] = replace(sub_array(array, count), name=name)
+    array, counts = model.array, [n for n in (3, 4, 8) if n < model.array.accelerometers]
+    arrays = [replace(sub_array(array, n), name=f"{n} triads") for n in counts]
     for name, factor in (("all triads in one plane", [1.0, 1.0, 0.0]), ("half the size", 0.5)):
-        arrays[name] = Array(array.positions * factor, array.labels, array.gyroscopes, name)
-    return {name: isotropic(model, array=other) for name, other in arrays.items()}
+        arrays.append(Array(array.positions * factor, array.labels, array.gyroscopes, name))
+    return {other.name: isotropic(model, array=other) for other in arrays}
 
 
 def rank_cases(model: ArrayModel, seed, sphere, normal) -> list[tuple]:
@@ -247,22 +244,19 @@ def rank_cases(model: ArrayModel, seed, sphere, normal) -> list[tuple]:
     rng = stream(seed, "bound", "ranks")
     many = normal_motion(rng, (50,), *normal)
     axis, still = np.array([0.0, 0.6, 0.8]), np.zeros((50, 3))
-    along = {
-        name: getattr(many, name)[:, 2:] * axis for name in ("angular_rate", "angular_acceleration")
+    rate, acceleration = (field[:, 2:] * axis for field in many[:2])
+    motions = {f"general motion, N = {n}": normal_motion(rng, (n,), *normal) for n in (1, 2, 3, 5)}
+    motions |= {
+        "the papers' magnitudes": sphere_motion(rng, (50,), *sphere),
+        "omega_dot = 0": many._replace(angular_acceleration=still),
+        "omega = 0": many._replace(angular_rate=still),
+        "turned about one axis": many._replace(
+            angular_rate=rate, angular_acceleration=acceleration
+        ),
+        "about one axis, omega_dot free": many._replace(angular_rate=rate),
     }
-    cases = [
-        (f"general motion, N = {n}", model, normal_motion(rng, (n,), *normal)) for n in (1, 2, 3, 5)
-    ]
-    cases += [
-        ("the papers' magnitudes", model, sphere_motion(rng, (50,), *sphere)),
-        ("omega_dot = 0", model, many._replace(angular_acceleration=still)),
-        ("omega = 0", model, many._replace(angular_rate=still)),
-        ("turned about one axis", model, many._replace(**along)),
-        ("about one axis, omega_dot free", model,
-         many._replace(angular_rate=along["angular_rate"])),
-    ]  # fmt: skip
-    cases += [(name, other, many) for name, other in geometries(model).items()]
-    return cases
+    cases = [(name, model, motion) for name, motion in motions.items()]
+    return cases + [(name, other, many) for name, other in geometries(model).items()]
 
 
 def bound_table(model, seed, cases) -> pd.DataFrame:
