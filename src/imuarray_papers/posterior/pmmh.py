@@ -98,12 +98,6 @@ def spread_starts(centre, sd, rng, chains: int = 2) -> np.ndarray:
     return centre + sd * rng.standard_normal((chains, centre.size))
 
 
-def checkpoint_beside(path: str | Path, key: str) -> Path:
-    """Where the state of the run ``key`` that is to write ``path`` is kept; hidden, beside it."""
-    path = Path(path)
-    return path.with_name(f".{path.name}.{key[:16]}.npz")
-
-
 def _begin(target, starts, seed, names):
     """Nothing drawn yet: ([draws, log target], emcee's state at the starts, accepted)."""
     values = [

@@ -1,5 +1,7 @@
 """The Bayesian studies of paper 2021: data, targets and chains from a configuration."""
 
+from pathlib import Path
+
 import numpy as np
 
 from imuarray.analysis.selection import disjoint
@@ -17,7 +19,7 @@ from imuarray_papers.estimation.bcd import calibrate_bcd
 from imuarray_papers.measured.positions import locate
 from imuarray_papers.posterior import tuning
 from imuarray_papers.posterior.likelihood import CompiledTarget, Likelihood
-from imuarray_papers.posterior.pmmh import checkpoint_beside, run_chains, spread_starts
+from imuarray_papers.posterior.pmmh import run_chains, spread_starts
 from imuarray_papers.posterior.proposals import rate_distribution
 
 
@@ -149,7 +151,8 @@ def sample_paired(settings, recording, target, step, transitions, names, path, a
         settings, recording.specific_force, recording.angular_rate, step, target.draws,
         code_digest(),
     )  # fmt: skip
-    checkpoint, seed = checkpoint_beside(path, key), settings["seed"]
+    path, seed = Path(path), settings["seed"]
+    checkpoint = path.with_name(f".{path.name}.{key[:16]}.npz")  # hidden, beside what is written
     starts = spread_starts(
         target.prior.mean, settings["paper2021"]["start_sd"], stream(seed, *names, "starts")
     )
