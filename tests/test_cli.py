@@ -11,7 +11,7 @@ import pytest
 
 import imuarray
 from imuarray.cli import main
-from imuarray.commands.output import Output
+from imuarray.commands.output import Answer
 from imuarray.errors import IdentifiabilityError, InputError
 
 
@@ -23,7 +23,8 @@ def calls(monkeypatch, tmp_path):
         ("recordings", "simulate"), ("calibrate", "calibrate"), ("sample", "sample")
     ):  # fmt: skip
         command = types.ModuleType(f"imuarray.commands.{module}")
-        setattr(command, name, lambda arguments, name=name: seen.append((name, arguments)))
+        note = lambda *given, name=name: seen.append((name, given[0])) or Answer("", {})  # noqa: E731
+        setattr(command, name, note)
         monkeypatch.setitem(sys.modules, f"imuarray.commands.{module}", command)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rec.nc").write_text("stands for a recording")
@@ -33,7 +34,7 @@ def calls(monkeypatch, tmp_path):
 
 
 def fail_with(monkeypatch, error):
-    def command(arguments):
+    def command(arguments, _):
         raise error
 
     module = types.ModuleType("imuarray.commands.calibrate")
@@ -140,18 +141,19 @@ def test_what_was_not_foreseen_is_one_line(calls, capsys, monkeypatch):
 def test_an_answer_not_to_be_trusted(calls, capsys, monkeypatch):
     reasons = ["positions off\x1b[31m", "residual 7 times"]
 
-    def command(arguments):
-        Output(arguments).done({"x": 1.0}, reasons)
+    def command(arguments, _):
+        return Answer("", {"x": 1.0}, reasons)
 
     monkeypatch.setattr(sys.modules["imuarray.commands.calibrate"], "calibrate", command)
     assert main("calibrate rec.nc --out cal.nc --json".split()) == 3
     out, err = capsys.readouterr()
     said = ["positions off\\x1b[31m", "residual 7 times"]
-    assert json.loads(out) == {"x": 1.0, "trusted": False, "reasons": said}
+    assert json.loads(out) == {"out": "cal.nc", "x": 1.0, "trusted": False, "reasons": said}
     assert err == f"imuarray: not to be trusted: (1) {said[0]}; (2) {said[1]}\n"
     reasons.clear()
     assert main("calibrate rec.nc --out cal.nc --json".split()) == 0
-    assert json.loads(capsys.readouterr().out) == {"x": 1.0, "trusted": True, "reasons": []}
+    expected = {"out": "cal.nc", "x": 1.0, "trusted": True, "reasons": []}
+    assert json.loads(capsys.readouterr().out) == expected
 
 
 def run_as_calibrate(code: str, tmp_path) -> tuple[int, str]:
@@ -175,7 +177,7 @@ def run_as_calibrate(code: str, tmp_path) -> tuple[int, str]:
 
 def test_termination_leaves_nothing_half_written(tmp_path):
     code = (
-        "def command(arguments):\n"
+        "def command(arguments, _):\n"
         "    with atomic_write(arguments.out) as temporary:\n"
         "        temporary.write_text('half')\n"
         "        os.kill(os.getpid(), signal.SIGTERM)\n"
@@ -187,7 +189,7 @@ def test_termination_leaves_nothing_half_written(tmp_path):
 
 def test_termination_does_not_wait_for_compiled_code(tmp_path):
     code = (
-        "def command(arguments):\n"
+        "def command(arguments, _):\n"
         "    kill = lambda: os.kill(os.getpid(), signal.SIGTERM)\n"
         "    threading.Timer(0.1, kill).start()\n"
         "    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})\n"  # would end the sleep
@@ -203,7 +205,7 @@ def test_an_interrupt_that_python_drops_comes_again(tmp_path):
         "    def __del__(self):\n"
         "        os.kill(os.getpid(), signal.SIGINT)\n"
         "        time.sleep(0.01)\n"
-        "def command(arguments):\n"
+        "def command(arguments, _):\n"
         "    Deaf()\n"
         "    time.sleep(20)\n"
     )
@@ -218,7 +220,12 @@ def test_no_message_reaches_the_terminal_as_a_command(calls, capsys, monkeypatch
 
 def test_a_warning_is_one_line(tmp_path):
     """In a process of its own: pytest collects warnings before they are printed."""
-    code = "def command(arguments):\n    warnings.warn('a gap\\nin time', stacklevel=1)\n"
+    code = (
+        "from imuarray.commands.output import Answer\n"
+        "def command(arguments, _):\n"
+        "    warnings.warn('a gap\\nin time', stacklevel=1)\n"
+        "    return Answer('', {})\n"
+    )
     assert run_as_calibrate(code, tmp_path) == (0, "imuarray: warning: a gap in time\n")
 
 

@@ -34,7 +34,10 @@ def script() -> NoReturn:
     Interrupted, it does not wait for threads of compiled code: Python's shutdown would fault.
     """
     _end_soon()
-    _share_heap()
+    gc.set_threshold(COLLECTED)  # fonts and figures are many objects, hardly any in a cycle
+    with suppress(OSError, AttributeError):  # not glibc
+        # two heaps for all threads: of its own each would keep what another has freed
+        ctypes.CDLL(None).mallopt(M_ARENA_MAX, 2)
     status = main()
     if status == INTERRUPTED:
         sys.stderr.flush()
@@ -60,16 +63,6 @@ def _end_soon() -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def _share_heap() -> None:
-    """Threads take memory from two heaps: of its own each would keep what another has freed.
-
-    Cycles are looked for less often: fonts and figures are many objects, hardly any in a cycle.
-    """
-    gc.set_threshold(COLLECTED)
-    with suppress(OSError, AttributeError):  # not glibc
-        ctypes.CDLL(None).mallopt(M_ARENA_MAX, 2)
-
-
 def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | None = None) -> int:
     """Run one command; returns the exit status.
 
@@ -86,7 +79,7 @@ def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | No
             (parser or make_parser()).parse_args(argv, arguments)
             _check_output(arguments)
             _read_effects(arguments)
-            arguments.run(arguments)
+            reasons = arguments.run(arguments)
     except InputError as error:
         return _fail(error)
     except BrokenPipeError:
@@ -105,8 +98,8 @@ def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | No
             traceback.print_exception(error)
         hint = "" if debug else " (--debug shows where)"
         return _fail(f"unforeseen: {type(error).__name__}: {error}{hint}", UNFORESEEN)
-    if arguments.reasons:
-        return _fail(f"not to be trusted: {numbered(arguments.reasons)}", UNTRUSTED)
+    if reasons:
+        return _fail(f"not to be trusted: {numbered(reasons)}", UNTRUSTED)
     return OK
 
 
@@ -166,7 +159,8 @@ def _check_output(arguments: argparse.Namespace) -> None:
     """Refuse an output that cannot be written now, not after an hour of sampling."""
     out: Path = arguments.out
     _require_writable(out, arguments.folder)
-    for source in _inputs(arguments):
+    values = (value if isinstance(value, list) else [value] for value in vars(arguments).values())
+    for source in (x for each in values for x in each if isinstance(x, InputFile)):
         bag = isinstance(source, InputLog) and source.is_dir()
         found = "a folder" if source.is_dir() else "none"
         require(source.is_file() or bag, str(source), "a file to read", found)
@@ -212,12 +206,6 @@ def _read_effects(arguments: argparse.Namespace) -> None:
     if hasattr(arguments, "effects") and not of_file:
         wanted = f"--effects that names what to use of {', '.join(new)}"
         require(arguments.effects, "--effect-file", wanted, "none")
-
-
-def _inputs(arguments: argparse.Namespace) -> list[InputFile]:
-    """The files a command reads."""
-    values = (value if isinstance(value, list) else [value] for value in vars(arguments).values())
-    return [item for each in values for item in each if isinstance(item, InputFile)]
 
 
 if __name__ == "__main__":

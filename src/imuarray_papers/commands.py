@@ -6,7 +6,7 @@ from imuarray.analysis.calibration import calibrate_papers
 from imuarray.analysis.model import assumed
 from imuarray.commands import calibrate as calibrating
 from imuarray.commands import sample as sampling
-from imuarray.commands.output import Output
+from imuarray.commands.output import Answer, Output
 from imuarray.recording import read_recording
 from imuarray.trust import of_file, reasons_of_poses, reasons_of_posterior
 from imuarray_papers.estimation.bcd import calibrate_bcd
@@ -14,18 +14,18 @@ from imuarray_papers.sampling import SHRUNK
 from imuarray_papers.sampling import sample as sampled
 
 
-def calibrate(arguments) -> None:
+def calibrate(arguments, output: Output) -> Answer:
     """Positions by ML-BCD; `imuarray calibrate --model papers` finds the same faster."""
-    output, recording = Output(arguments), read_recording(arguments.recording)
+    recording = read_recording(arguments.recording)
     search = partial(calibrate_bcd, tolerance=1e-9)
     dataset = calibrate_papers(recording, arguments.accelerometer_noise, output.notify, search)
     arguments.recordings = [arguments.recording]
-    calibrating.written(dataset, [recording], arguments, output)
+    return calibrating.written(dataset, [recording], arguments)
 
 
-def sample(arguments) -> None:
+def sample(arguments, output: Output) -> Answer:
     """Chains of the positions' posterior as in paper 2021; see `imuarray_papers.sampling`."""
-    output, recording = Output(arguments), read_recording(arguments.recording)
+    recording = read_recording(arguments.recording)
     posterior = sampled(
         recording, arguments.method, arguments.steps, arguments.seed, arguments.rates,
         arguments.accelerometer_noise, output.progress, output.notify,
@@ -39,4 +39,4 @@ def sample(arguments) -> None:
             f"the flat motion prior makes the array {shrunk:.2g} posterior sds smaller than it is:"
             " take imuarray sample"
         )
-    sampling.written(posterior, reasons, arguments.out, output)
+    return sampling.written(posterior, reasons, arguments.out)

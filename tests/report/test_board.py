@@ -19,8 +19,8 @@ from benchmarks.board import Options, draw_board, write
 from imuarray.analysis.board import board
 from imuarray.analysis.motion import _late, as_calibrated
 from imuarray.cli import main
-from imuarray.commands.board import answer
-from imuarray.commands.lines import position_lines
+from imuarray.commands.board import lines_on
+from imuarray.commands.calibrate import position_lines
 from imuarray.engine.estimate import Recorded, estimate
 from imuarray.engine.forward import EFFECT_GROUPS, GYROSCOPES, gains
 from imuarray.engine.parameters import POSITION, columns_of
@@ -117,12 +117,12 @@ def test_an_answer_not_to_be_trusted_says_so_first(
 
 
 def test_a_terminal_has_the_answer_first_in_few_lines(found):
-    lines = answer(found, Path("answer"))
+    lines = lines_on(found, Path("answer"))
     assert lines[0].startswith("The positions of 4 IMUs are known to") and len(lines) <= 15
     assert any(re.match(r"IMU 4 is read [\d.]+\s±\s[\d.]+ ms late", line) for line in lines)
     assert "imuarray apply answer/cal.nc answer/recording.nc" in "".join(lines)
     assert lines[-1] == "Page: answer/report.html"
-    odd = answer(found._replace(reasons=["odd"]), Path("answer"))
+    odd = lines_on(found._replace(reasons=["odd"]), Path("answer"))
     assert odd[0].startswith("If the answer could be trusted") and "is read" not in "".join(odd)
 
 
@@ -163,7 +163,7 @@ def test_an_accelerometer_with_other_axes_than_declared_is_told_from_its_gyrosco
     odd = found._replace(first_order=replace(odd, triads=replace(odd.triads, matrix=matrix)))
     (said,) = turned(odd)
     assert re.match(r"Accelerometer 2 is turned by 1(79|80)\.\d degrees .*gyroscope 2 is not", said)
-    assert said in answer(odd, Path()) and "Nothing speaks" not in verdict(odd)
+    assert said in lines_on(odd, Path()) and "Nothing speaks" not in verdict(odd)
     assert turned(found) == [] and "Nothing speaks" in verdict(found)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from imuarray.commands.output import Output
+from imuarray.commands.output import Answer
 from imuarray.firstorder.noise import StillNoise, allan
 from imuarray.pictures.noise import noise_figure
 from imuarray.pictures.style import saved
@@ -14,9 +14,8 @@ SHOWN = {"specific_force": ("accelerometer", 1e3, "mm/s^2"),
 UNITS = {"noise_density": "{}/sqrt(Hz)", "bias_instability": "{}", "random_walk": "{}/s/sqrt(Hz)"}
 
 
-def run(arguments) -> None:
+def run(arguments, _) -> Answer:
     """Allan deviation, spectrum and noise terms of a recording's still stretches."""
-    output = Output(arguments)
     noise, folder = allan(read_recording(arguments.recording)), arguments.out
     figure = noise_figure(noise, [arguments.recording.name])
     write_csv(noise.deviation, folder / "allan.csv")
@@ -24,9 +23,8 @@ def run(arguments) -> None:
         write_bytes(saved(figure, ending), folder / f"allan.{ending}")
     write_csv(noise.spectrum, folder / "spectrum.csv")
     write_csv(noise.terms, folder / "noise.csv")
-    output.notify("\n".join(lines(noise)))
-    output.done({
-        "out": str(folder), "rate_hz": noise.rate_hz, "stretches_s": noise.stretches_s,
+    return Answer("\n".join(lines(noise)), {
+        "rate_hz": noise.rate_hz, "stretches_s": noise.stretches_s,
         "terms": noise.terms.to_dict("records"),
     })  # fmt: skip
 

@@ -8,7 +8,7 @@ import xarray as xr
 
 from imuarray.analysis.model import assumed
 from imuarray.analysis.motion import as_calibrated, motion_parts
-from imuarray.commands.output import Output
+from imuarray.commands.output import Answer
 from imuarray.errors import InputError
 from imuarray.motion.state import UNITS
 from imuarray.provenance import trust, write_netcdf_parts
@@ -20,9 +20,8 @@ RAILED = "off_the_rail", "at_the_rail"
 LATE = 1e-4  # s, worth a line
 
 
-def apply(arguments) -> None:
+def apply(arguments, _) -> Answer:
     """The calibrated array's motion with covariances; see `imuarray.apply` for the output."""
-    output = Output(arguments)
     read = read_recording(arguments.recording, stored=True)
     calibration = load_dataset(arguments.calibration)
     noise, tallies = arguments.accelerometer_noise, []
@@ -46,10 +45,8 @@ def apply(arguments) -> None:
     average = recording.gyroscope_noise_sd / np.sqrt(recording.angular_rate.shape[1])
     found = totals(tallies) | {
         "gyroscopes_averaged_sd_rad_s": average, "late_s": first.attrs["late_s"],
-        "out": str(arguments.out),
     }  # fmt: skip
-    output.notify("\n".join(report(found)))
-    output.done(found, reasons)
+    return Answer("\n".join(report(found)), found, reasons)
 
 
 def tally(part: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:

@@ -61,7 +61,5 @@ def _number(kind: type, least: float, most: float, expected: str, text: str) -> 
 count, seed = (
     partial(_number, int, least, 2**63 - 1, f"an integer of at least {least}") for least in (1, 0)
 )
-positive = partial(
-    _number, float, SMALLEST, LARGEST,
-    f"a positive number, between {SMALLEST:g} and {LARGEST:g}",
-)  # fmt: skip
+SIZES = f"a positive number, between {SMALLEST:g} and {LARGEST:g}"
+positive = partial(_number, float, SMALLEST, LARGEST, SIZES)

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from imuarray.analysis.board import board as answered
-from imuarray.commands.lines import document, position_lines
-from imuarray.commands.output import Output
+from imuarray.commands.calibrate import document, position_lines
+from imuarray.commands.output import Answer, Output
 from imuarray.report import board as said
 from imuarray.report.board import Board, write_board
 
@@ -12,18 +12,17 @@ TABLE = 8  # IMUs whose positions are printed; of more they are in positions.csv
 CAUSES, STEPS = 3, 2  # at most, of what the page says
 
 
-def board(arguments) -> None:
+def board(arguments, output: Output) -> Answer:
     """From logs to positions, on the defaults, and a page of all that was found."""
-    output = Output(arguments)
     found = answered(
         arguments.logs, arguments.columns, arguments.gravity, arguments.topics, output.step
     )
     write_board(found, arguments.out)
-    output.notify("\n".join(answer(found, arguments.out)))
-    output.done(document(found.calibration) | {"out": str(arguments.out)}, found.reasons)
+    text = "\n".join(lines_on(found, arguments.out))
+    return Answer(text, document(found.calibration), found.reasons)
 
 
-def answer(found: Board, folder: Path) -> list[str]:
+def lines_on(found: Board, folder: Path) -> list[str]:
     """The page's beginning for a terminal: the answer, what it rests on, what to do next."""
     calibration = found.calibration
     lines = [said.verdict(found)]

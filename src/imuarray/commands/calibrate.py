@@ -1,32 +1,115 @@
-"""The work behind `imuarray calibrate`."""
+"""The work behind `imuarray calibrate`: a calibration, in lines, and its main numbers."""
 
+import numpy as np
 import xarray as xr
 
 from imuarray.analysis.calibration import calibrate as calibrated
 from imuarray.analysis.model import assumed
-from imuarray.commands.lines import document, report
-from imuarray.commands.output import Output
+from imuarray.commands.output import Answer, Output
+from imuarray.engine.directions import position_sds, weakest_of
+from imuarray.model.effects import KINDS
 from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording
-from imuarray.trust import of_file, reasons_of_calibration, reasons_of_poses
+from imuarray.trust import of_file, parameters_of, reasons_of_calibration, reasons_of_poses
+from imuarray.words import number
+
+MISFIT = 1.5  # residual over declared noise from which it is spoken of
 
 
-def calibrate(arguments) -> None:
+def calibrate(arguments, output: Output) -> Answer:
     """Positions and motion by maximum likelihood; see `imuarray.calibrate` for the output."""
-    output = Output(arguments)
     papers = arguments.model == "papers"
     recordings = [read_recording(path, papers) for path in arguments.recordings]
     noise = arguments.accelerometer_noise
     dataset = calibrated(recordings, arguments.model, arguments.effects, noise, output.notify)
-    written(dataset, recordings, arguments, output)
+    return written(dataset, recordings, arguments)
 
 
-def written(dataset: xr.Dataset, recordings, arguments, output: Output) -> None:
+def written(dataset: xr.Dataset, recordings, arguments) -> Answer:
     """Writes a calibration and reports on it."""
     known = reasons_of_poses(*map(of_file, arguments.recordings))
     reasons = reasons_of_calibration(
         [assumed(one, arguments.accelerometer_noise) for one in recordings], dataset, known
     )
     write_netcdf(dataset.assign_attrs(trust(reasons)), arguments.out)
-    output.notify(report(dataset))
-    output.done(document(dataset) | {"out": str(arguments.out)}, reasons)
+    return Answer(report(dataset), document(dataset), reasons)
+
+
+def document(dataset: xr.Dataset) -> dict:
+    """A calibration's main numbers."""
+    labels = [str(label) for label in dataset["accelerometer"].to_numpy()]
+    found = {
+        "converged": bool(dataset.attrs["converged"]),
+        "iterations": dataset.sizes["iteration"],
+        "samples": dataset.attrs["samples"],
+        "residual_ratio": dataset.attrs["residual_ratio"],
+        "accelerometers": labels,
+        "position_m": dataset["position"].to_numpy(),
+        "position_sd_m": position_sds(dataset),
+        "weakest_directions": [
+            {"direction": item.words, "sd_m": item.sd} for item in weakest_of(dataset)
+        ],
+    }
+    if "effect_parameter" in dataset:
+        found["effects"] = parameters_of(dataset)
+    return found
+
+
+def report(dataset: xr.Dataset) -> str:
+    """Lines on a calibration for a person."""
+    state = "converged" if dataset.attrs["converged"] else "NOT converged"
+    count, samples = dataset.sizes["iteration"], dataset.attrs["samples"]
+    lines = [f"{state} after {count} iterations, {samples} samples", *position_lines(dataset)]
+    parameters = parameters_of(dataset)  # in their own units (docs/effects.md)
+    if parameters:
+        lines.append("effect parameter: value (sd)")
+    lines += [f"{name}: {at['value']:.4g} ({at['sd']:.2g})" for name, at in parameters.items()]
+    return "\n".join([*lines, *_informative(dataset), *_misfit(dataset)])
+
+
+def position_lines(dataset: xr.Dataset) -> list[str]:
+    """A line for each triad under a head."""
+    sds = position_sds(dataset)
+    unit, factor = ("um", 1e6) if sds.max() < 1e-3 else ("mm", 1e3)
+    lines = [f"triad   x mm      y mm      z mm    (sd {unit})"]
+    rows = dataset["accelerometer"].to_numpy(), dataset["position"].to_numpy(), sds
+    for label, row, sd in zip(*rows, strict=True):
+        values = "  ".join(f"{1e3 * value:8.4f}" for value in row)
+        lines.append(f"{label:>5} {values}    {', '.join(number(factor * x, 2) for x in sd)}")
+    return lines
+
+
+def _informative(dataset: xr.Dataset) -> list[str]:
+    """Lines on how well the recording determines the positions, and which combinations worst."""
+    worst, prior = weakest_of(dataset), dataset.attrs["position_prior_sd"]
+    rms = np.sqrt(np.mean(position_sds(dataset)[1:] ** 2))
+    said = ", ".join(f"{item.words} ({1e6 * item.sd:.2g} um)" for item in worst)
+    bound = " by the Cramer-Rao bound" if dataset.attrs["model"] == "papers" else ""
+    lines = [f"positions to {1e6 * rms:.2g} um rms{bound}; worst determined: {said}"]
+    if worst[0].sd > prior:
+        lines.append(
+            f"{worst[0].words}: determined worse than by the nominal positions,"
+            f" {1e3 * prior:g} mm; turn the array faster, and about all axes"
+        )
+    return lines
+
+
+def _misfit(dataset: xr.Dataset) -> list[str]:
+    """One line where the residual is not what the declared noise explains."""
+    ratio = dataset.attrs["residual_ratio"]
+    if not ratio > MISFIT:
+        return []
+    papers = dataset.attrs["model"] == "papers"
+    if "gyroscope_smooth_residual" in dataset:
+        usual = {kind: float(np.median(dataset[f"{kind}_smooth_residual"])) for kind in KINDS}
+        sizes = [f"{value:.2g} ({kind}s)" for kind, value in usual.items()]
+        return [
+            f"rough motion: the residual is {' and '.join(sizes)} times the declared noise in"
+            f" smooth samples that turn fast, {ratio:.3g} over all: shocks are faster"
+            " than the samples, and count little"
+        ]
+    allowed = "are too small, by that or more" if papers else "take it for noise"
+    return [
+        f"residual {ratio:.3g} times the declared noise: the model misses something, and the"
+        f" sds above {allowed}"
+    ]

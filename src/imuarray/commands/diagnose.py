@@ -1,6 +1,6 @@
 """The work behind `imuarray diagnose`."""
 
-from imuarray.commands.output import Output
+from imuarray.commands.output import Answer, Output
 from imuarray.diagnosis.document import diagnose as run
 from imuarray.errors import require
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS
@@ -9,19 +9,19 @@ from imuarray.report.write import write_report
 from imuarray.trust import of_file, reasons_of_diagnosis, reasons_of_poses
 
 
-def diagnose(arguments) -> None:
+def diagnose(arguments, output: Output) -> Answer:
     """Name what the plain model misses on a recording; a folder with the report."""
     known = {*EFFECTS, *DATA_EFFECTS}
     for name in arguments.without:
         require(name in known, "--without", f"any of {', '.join(sorted(known))}", name)
-    recording, output = read_recording(arguments.recording), Output(arguments)
+    recording = read_recording(arguments.recording)
     found = run(recording, arguments.seed, arguments.without, arguments.recording, output.step)
     reasons = reasons_of_poses(of_file(arguments.recording))
     reasons += reasons_of_diagnosis(recording, found.document)
     found.document.update(trusted=not reasons, reasons=reasons)
     write_report(found, arguments.out)
-    output.notify("\n".join([*report(found.document), f"report: {arguments.out / 'report.html'}"]))
-    output.done(found.document | {"out": str(arguments.out)}, reasons)
+    lines = [*report(found.document), f"report: {arguments.out / 'report.html'}"]
+    return Answer("\n".join(lines), found.document, reasons)
 
 
 def report(document: dict) -> list[str]:

@@ -1,7 +1,7 @@
 """The work behind `imuarray export`."""
 
 from imuarray.analysis.export import export
-from imuarray.commands.output import Output
+from imuarray.commands.output import Answer
 from imuarray.errors import InputError
 from imuarray.firstorder.noise import allan
 from imuarray.provenance import write_bytes
@@ -9,9 +9,8 @@ from imuarray.recording import load_dataset, read_recording
 from imuarray.trust import reasons_in
 
 
-def run(arguments) -> None:
+def run(arguments, _) -> Answer:
     """A calibration in another tool's format; one that is not to be trusted says so in it."""
-    output = Output(arguments)
     calibration = load_dataset(arguments.calibration)
     noise = None if arguments.noise is None else allan(read_recording(arguments.noise))
     try:
@@ -21,5 +20,5 @@ def run(arguments) -> None:
         raise InputError(f"{arguments.calibration}: {error}") from None
     write_bytes(text.encode(), arguments.out)
     count = calibration.sizes["accelerometer"]
-    output.notify(f"{arguments.out}: {count} IMUs, {arguments.format}")
-    output.done({"out": str(arguments.out), "format": arguments.format, "imus": count}, reasons)
+    found = {"format": arguments.format, "imus": count}
+    return Answer(f"{arguments.out}: {count} IMUs, {arguments.format}", found, reasons)

@@ -4,10 +4,22 @@ import json
 import sys
 import time
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from imuarray.errors import one_line, printable
 from imuarray.provenance import finite
+
+
+class Answer(NamedTuple):
+    """A command's text for a person, its numbers (SI units, named in the keys), and its doubts.
+
+    ``reasons``: sentences why it is not to be trusted (`imuarray.provenance.trust` puts them into
+    the file); with any, `imuarray.cli.main` prints them as its last line and returns 3.
+    """
+
+    text: str
+    document: dict[str, Any]
+    reasons: Sequence[str] = ()
 
 
 class Output:
@@ -17,7 +29,7 @@ class Output:
     """
 
     def __init__(self, arguments):
-        self._arguments, self._start = arguments, time.monotonic()
+        self._start, self._out = time.monotonic(), str(arguments.out)
         self.json = bool(getattr(arguments, "json", False))
         self.progress = not arguments.quiet
         self.text = self.progress and not self.json
@@ -33,14 +45,12 @@ class Output:
             seconds = time.monotonic() - self._start
             print(f"{seconds:6.1f} s  {printable(text)}", file=sys.stderr, flush=True)
 
-    def done(self, document: dict[str, Any], reasons: Sequence[str] = ()) -> None:
-        """The numbers of the result; SI units, named in the keys.
-
-        ``reasons``: sentences why it is not to be trusted (`imuarray.provenance.trust` puts them
-        into the file); with any, `imuarray.cli.main` prints them as its last line and returns 3.
-        """
-        said = [one_line(reason) for reason in reasons]
+    def done(self, answer: Answer) -> list[str]:
+        """The reasons, each in a line; prints the text, or the output's path and the numbers."""
+        self.notify(answer.text)
+        reasons = [one_line(reason) for reason in answer.reasons]
         if self.json:
-            verdict = {"trusted": not said, "reasons": said}
-            print(json.dumps(finite(document) | verdict, allow_nan=False), flush=True)
-        self._arguments.reasons = said
+            document = {"out": self._out} | finite(answer.document)
+            verdict = {"trusted": not reasons, "reasons": reasons}
+            print(json.dumps(document | verdict, allow_nan=False), flush=True)
+        return reasons

@@ -29,6 +29,7 @@ def option(name: str, help: str, **given: Any) -> Option:
 
 
 def number(name: str, metavar: str, help: str, default: Any = None, type=positive) -> Option:
+    help = help if default is None else f"{help} (default: {default:g})"
     return option(name, help, metavar=metavar, default=default, type=type)
 
 
@@ -37,7 +38,7 @@ def file_option(name: str, help: str, type=InputFile, **given: Any) -> Option:
 
 
 RECORDING = option("recording", "NetCDF-4 recording to read", type=InputFile)
-SEED = number("--seed", "S", "seed of the random numbers (default: 0)", 0, seed)
+SEED = number("--seed", "S", "seed of the random numbers", 0, seed)
 NOISE = number(
     "--accelerometer-noise",
     "SD",
@@ -82,8 +83,7 @@ TOPICS = option("--topics", "of ROS bags, the reference first (default: those of
                  nargs="+", default=(), metavar="/imu0")  # fmt: skip
 TABLES = option("data", "CSV file with a header; several where IMUs logged each by itself",
                  type=InputFile, nargs="+")  # fmt: skip
-GRAVITY = number("--gravity", "G", "magnitude of gravity where it was recorded, m/s^2 (default:"
-                  " 9.80665)", 9.80665)  # fmt: skip
+GRAVITY = number("--gravity", "G", "magnitude of gravity where it was recorded, m/s^2", 9.80665)
 
 COMMANDS = (
     Command(
@@ -114,8 +114,8 @@ COMMANDS = (
         (
             option("--board", "its array: mimu4444_corners, 8 IMUs (default), or mimu4444",
                     default="mimu4444_corners", metavar="NAME"),
-            number("--duration", "S", "s of motion (default: 10)", 10.0),
-            number("--rate", "HZ", "samples a second (default: 100)", 100.0), SEED, *EFFECTS,
+            number("--duration", "S", "s of motion", 10.0),
+            number("--rate", "HZ", "samples a second", 100.0), SEED, *EFFECTS,
         ),
     ),
     Command(
@@ -128,14 +128,11 @@ COMMANDS = (
                   " rows x, y, z", required=True),
             option("--underside", "IMUs turned over (default: the even-numbered ones)",
                     metavar="2,4"),
-            number("--accelerometer-noise", "SD", "sd of one reading, m/s^2 (default: 0.04)",
-                    0.04),
-            number("--gyroscope-noise-dps", "SD", "sd of one reading, deg/s (default: 0.06)",
-                    0.06),
-            number("--position-prior", "SD", "sd of the nominal positions, m (default: 0.003)",
-                    3e-3),
+            number("--accelerometer-noise", "SD", "sd of one reading, m/s^2", 0.04),
+            number("--gyroscope-noise-dps", "SD", "sd of one reading, deg/s", 0.06),
+            number("--position-prior", "SD", "sd of the nominal positions, m", 3e-3),
             number("--output-rate", "HZ", "readings that a sensor makes in a second, of which the"
-                    " host takes the newest (default: 1000)", 1000.0),
+                    " host takes the newest", 1000.0),
         ),
     ),
     Command(
@@ -166,8 +163,7 @@ COMMANDS = (
             option("--gyroscopes", "calibrate: scales, misalignments, orientations, from the moves"
                     " between poses (default); offset: only their offsets, as in the 2021 paper",
                     choices=("calibrate", "offset"), default="calibrate"),
-            number("--shortest-pose", "S", "shortest still pose, s (default: 3)",
-                    3.0),
+            number("--shortest-pose", "S", "shortest still pose, s", 3.0),
             option("--with", "further recordings of the board, made at the same place: maps, and"
                     " so the array's frame and size, are from the poses and moves of all",
                     type=InputFile, nargs="+", default=[], dest="others", metavar="other.nc"),
@@ -310,9 +306,15 @@ def _add(commands, name: str, command: Command) -> None:
     for option_name, given in command.options:
         parser.add_argument(option_name, **given)
     run = partial(_run, f"{command.package}.{command.run}")
-    parser.set_defaults(run=run, folder=command.folder, reasons=())
+    parser.set_defaults(run=run, folder=command.folder)
 
 
-def _run(place: str, arguments: argparse.Namespace) -> None:
-    """Calls the function at ``place``; its module is not loaded before."""
-    resolve_name(place)(arguments)
+def _run(place: str, arguments: argparse.Namespace) -> list[str]:
+    """Reasons why the answer of the function at ``place`` is not to be trusted, and it printed.
+
+    Its module is not loaded before.
+    """
+    from imuarray.commands.output import Output
+
+    output = Output(arguments)
+    return output.done(resolve_name(place)(arguments, output))

@@ -9,7 +9,7 @@ import xarray as xr
 from imuarray.analysis.model import assumed
 from imuarray.analysis.sampling import sample as sampled
 from imuarray.analysis.sampling import summary
-from imuarray.commands.output import Output
+from imuarray.commands.output import Answer, Output
 from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording
 from imuarray.trust import of_file, reasons_of_poses, reasons_of_posterior
@@ -21,9 +21,8 @@ VERDICT = (
 TOLD = "pareto_k", "instead_of"  # by samplers that have them
 
 
-def sample(arguments) -> None:
+def sample(arguments, output: Output) -> Answer:
     """Chains of the positions' posterior; see `imuarray.sample`."""
-    output = Output(arguments)
     recording = read_recording(arguments.recording)
     posterior = sampled(
         recording, arguments.model, arguments.method, arguments.steps, arguments.seed,
@@ -32,16 +31,15 @@ def sample(arguments) -> None:
     recording = assumed(recording, arguments.accelerometer_noise)
     reasons = reasons_of_poses(of_file(arguments.recording))
     reasons += reasons_of_posterior(recording, posterior)
-    written(posterior, reasons, arguments.out, output)
+    return written(posterior, reasons, arguments.out)
 
 
-def written(posterior: xr.DataTree, reasons: list[str], out: Path, output: Output) -> None:
+def written(posterior: xr.DataTree, reasons: list[str], out: Path) -> Answer:
     """Writes the chains and reports on them."""
     posterior.attrs |= trust(reasons)
     write_netcdf(posterior, out)
     table = summary(posterior)
-    output.notify(report(posterior, table))
-    output.done(document(posterior, table) | {"out": str(out)}, reasons)
+    return Answer(report(posterior, table), document(posterior, table), reasons)
 
 
 def document(posterior: xr.DataTree, table: pd.DataFrame) -> dict:
