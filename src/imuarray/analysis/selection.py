@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 from imuarray.errors import InputError
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model.structure import design, products
 from imuarray.recording import Recording
 from imuarray.recording.channels import require_once
-from imuarray.recording.record import few, neighbours
+from imuarray.recording.record import few
 
 SLOWEST = np.radians(100.0)  # rad/s; slower samples say nearly nothing of the positions
 SHAKEN = 3.0  # m/s^2, sd; a board in a hand that does not turn it has less
@@ -83,7 +84,7 @@ def select_dynamic(recording: Recording) -> Selection:
         f"slower than {np.degrees(SLOWEST):g} deg/s": speed < SLOWEST,
         "accelerometer at a rail": rails[0],
         "gyroscope at a rail": rails[1],
-        "next to a rail": neighbours(rails[0] | rails[1]),
+        "next to a rail": binary_dilation(rails[0] | rails[1]),
     }
     left, removed = np.ones(speed.shape, bool), {}
     for words, bad in criteria.items():

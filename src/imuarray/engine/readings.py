@@ -6,6 +6,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
+from scipy.ndimage import binary_dilation
 
 from imuarray.engine.settings import SETTINGS
 from imuarray.errors import InputError
@@ -15,7 +16,6 @@ from imuarray.model import ArrayModel
 from imuarray.model.effects import KINDS
 from imuarray.model.structure import design
 from imuarray.recording import Recording, array_of
-from imuarray.recording.record import neighbours
 
 
 class ResidualMaps(NamedTuple):
@@ -293,7 +293,7 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
     array = array_of(recording)
     force, rate = recording.saturated_accelerometers(), recording.saturated_gyroscopes()
     blind = rate.all(axis=1).any(axis=1)
-    bad = neighbours(blind) | recording.still()
+    bad = binary_dilation(blind) | recording.still()
     used = _long_runs(recording.time, ~bad)
     step = np.median(np.diff(recording.time)) if len(bad) > 1 else np.inf
     dense = used.sum() > SETTINGS.dense * np.sum(~bad) and step < SETTINGS.longest_step

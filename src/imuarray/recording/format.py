@@ -29,22 +29,19 @@ def from_dataset(dataset: xr.Dataset, where: str = "recording", stored: bool = F
         found = Stored(dataset[name].variable, scale)
         return found if stored and name in record.SAMPLED and dataset[name].ndim > 1 else found[:]
 
-    arrays = {
+    given = {
         name: values(
             name, factor(quantity, dataset[name].attrs.get("units"), f"{where}: {name}: units")
         )
         for name, quantity in record.QUANTITIES.items()
     }
-    matrices = [name for name in record.MATRICES if name in dataset]
-    corrected = [name for name in record.CORRECTION if name in dataset]
+    given |= {name: values(name) for name in record.FLAGS if name in dataset}
+    given |= {n: dataset[n].values.astype(float) for n in record.MATRICES if n in dataset}
     numbers = [n for n in record.NUMBERS | record.OPTIONAL_NUMBERS if n in dataset.attrs]
-    flags = [name for name in record.FLAGS if name in dataset]
+    corrected = [name for name in record.CORRECTION if name in dataset]
     recording = Recording(
-        **arrays,
-        accelerometer_labels=validate.labels_of(dataset["accelerometer"]),
-        gyroscope_labels=validate.labels_of(dataset["gyroscope"]),
-        **{name: values(name) for name in flags},
-        **{name: dataset[name].values.astype(float) for name in matrices},
+        **given,
+        **{f"{kind}_labels": validate.labels_of(dataset[kind]) for kind in record.KINDS},
         correction=dataset[corrected] if corrected else None,
         **{name: float(np.asarray(dataset.attrs[name]).item()) for name in numbers},
         **{name: str(dataset.attrs.get(name, "")) for name in record.TEXTS},

@@ -53,11 +53,9 @@ DIMENSIONS = {
 FLAGS = ("stationary", "specific_force_saturated", "angular_rate_saturated")
 # What each number is, by name in `units.UNITS`.
 QUANTITIES = {
-    "time": "time",
-    "specific_force": "force",
-    "angular_rate": "rate",
+    "time": "time", "specific_force": "force", "angular_rate": "rate",
     "accelerometer_position": "length",
-}
+}  # fmt: skip
 SI = {name: next(iter(UNITS[quantity])) for name, quantity in QUANTITIES.items()}
 # Attributes that are positive numbers, and their units.
 NUMBERS = {
@@ -148,14 +146,6 @@ def pieces(breaks) -> list[slice]:
     return [slice(first, last) for first, last in pairwise(ends)]
 
 
-def neighbours(mask: np.ndarray) -> np.ndarray:
-    """Samples next to one in the mask, and those themselves."""
-    near = mask.copy()
-    near[1:] |= mask[:-1]
-    near[:-1] |= mask[1:]
-    return near
-
-
 def few(index: np.ndarray) -> np.ndarray:
     """Some of many samples' indices, spread over them."""
     return index[:: max(1, -(-len(index) // PART))]
@@ -236,22 +226,17 @@ class Recording:
 
     def to_dataset(self) -> xr.Dataset:
         """The recording as the file holds it, rates in rad/s; InputError for shapes at odds."""
+        types = dict.fromkeys(SI, float) | dict.fromkeys(FLAGS, bool) | dict.fromkeys(MATRICES)
+        units = {name: {"units": SI.get(name, "1")} for name in (*SI, *MATRICES)}
         variables = {
-            name: (DIMENSIONS[name], np.asarray(getattr(self, name), float), {"units": unit})
-            for name, unit in SI.items()
-        }
-        given = {n: x for n in (*FLAGS, *MATRICES) if (x := getattr(self, n)) is not None}
-        for name, values in given.items():
-            own = np.asarray(values, bool if name in FLAGS else None)
-            variables[name] = DIMENSIONS[name], own, {} if name in FLAGS else {"units": "1"}
+            name: (DIMENSIONS[name], np.asarray(values, kind), units.get(name, {}))
+            for name, kind in types.items() if (values := getattr(self, name)) is not None
+        }  # fmt: skip
         if self.correction is not None:
             variables |= {name: self.correction[name].variable for name in CORRECTION}
-        coordinates = {
-            "time": variables.pop("time"),
-            "accelerometer": ("accelerometer", np.array(self.accelerometer_labels, object)),
-            "gyroscope": ("gyroscope", np.array(self.gyroscope_labels, object)),
-            "axis": ("axis", np.array(AXES, object)),
-        }
+        labels = {kind: getattr(self, f"{kind}_labels") for kind in KINDS} | {"axis": AXES}
+        coordinates = {name: (name, np.array(own, object)) for name, own in labels.items()}
+        coordinates = {"time": variables.pop("time"), **coordinates}
         declared = [name for name in OPTIONAL_NUMBERS if not np.isnan(getattr(self, name))]
         attributes = {name: float(getattr(self, name)) for name in (*NUMBERS, *declared)}
         attributes |= {name: getattr(self, name) for name in TEXTS if getattr(self, name)}

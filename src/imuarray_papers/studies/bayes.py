@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 from imuarray.analysis.selection import disjoint
 from imuarray.geometry import Array
@@ -11,7 +12,6 @@ from imuarray.posterior.chains import chain_tree
 from imuarray.posterior.prior import GaussianPrior
 from imuarray.provenance import code_digest, digest, stamp, write_netcdf
 from imuarray.recording import Recording
-from imuarray.recording.record import neighbours
 from imuarray.simulation.recordings import simulate_recording, simulate_samples
 from imuarray.streams import stream
 from imuarray_papers.config import model_from, motion_sds
@@ -72,7 +72,7 @@ def select_disjoint(recording: Recording, counts) -> dict[int, np.ndarray]:
     A sample is used when nothing saturates in it or next to it and it rotates faster than
     the median; the sets are spread evenly over the recording.
     """
-    near = neighbours(recording.at_rail("gyroscope"))
+    near = binary_dilation(recording.at_rail("gyroscope"))
     speed = np.linalg.norm(recording.angular_rate.mean(axis=1), axis=1)
     return disjoint(np.flatnonzero(~near & (speed >= np.median(speed))), counts)
 
