@@ -8,16 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from imuarray.errors import InputError, expecting, require
-from imuarray.recording.layout import QUANTITIES, read_layout, si_units
+from imuarray.recording.layout import KINDS, read_layout, si_units
 from imuarray.recording.rig import Readings, Rig, pair, to_rig
 
-ENDINGS = (".bag", ".mcap", ".db3")
+ENDINGS = (".bag", ".mcap", ".db3")  # or a folder
 MESSAGE = "sensor_msgs/msg/Imu"
-
-
-def is_bag(path: Path) -> bool:
-    """A ROS 1 bag, a ROS 2 bag's folder, or one of its files."""
-    return path.is_dir() or path.suffix.lower() in ENDINGS
 
 
 def read_bags(
@@ -79,7 +74,7 @@ def _readings(parts: dict[str, list], topic: str, kind: int, imu, where: str) ->
     stamps, values = (np.concatenate(part) for part in zip(*joined, strict=True))
     found = f"none (0) in {np.sum(stamps == 0)} of {len(stamps)}"
     require(stamps.all(), topic, "stamps in the messages' headers", found)
-    name, quantity = list(QUANTITIES.items())[kind]
+    name, quantity = list(KINDS.items())[kind]
     unit = si_units(imu[name], quantity, f"{where}: {name}")
     return Readings(stamps, 1e-9, unit * values[:, 3 * kind : 3 * kind + 3], topic)
 

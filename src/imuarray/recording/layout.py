@@ -14,8 +14,7 @@ from imuarray.recording.settings import SETTINGS
 from imuarray.recording.units import factor
 from imuarray.recording.validate import is_rotation
 
-KINDS = "accelerometers", "gyroscopes"
-QUANTITIES = {"accelerometers": "force", "gyroscopes": "rate"}
+KINDS = {"accelerometers": "force", "gyroscopes": "rate"}
 # Which keys may be in each section, and which have to be there, the editors' schema says. A board's
 # triads share one table's rows; a rig's IMUs have each their own log, or topic, and stamps.
 SCHEMA = Path(__file__).with_name("columns.schema.json")
@@ -57,31 +56,13 @@ def read_layout(path: str | PathLike, bag: bool = False) -> dict[str, Any]:
     rig = bag or (isinstance(layout, dict) and "imus" in layout)
     schema = BAG if bag else RIG if rig else BOARD
     _require_keys(layout, schema, str(path))
-    for kind in KINDS:
-        where, known = f"{path}: {kind}", schema["properties"][kind]
-        _require_keys(layout[kind], known, where)
-        if not rig:
-            triads = known["properties"]["triads"]
-            _require_sections(layout[kind]["triads"], where, "triads", triads)
-    if rig:
-        imus = schema["properties"]["imus"]
-        _require_sections(layout["imus"], f"{path}: imus", "IMUs", imus)
-        for label, imu in layout["imus"].items():
-            for kind in KINDS:
-                own, known = imu.get(kind, {}), imus["additionalProperties"]["properties"][kind]
-                _require_keys(own, known, f"{path}: imus {label!r}: {kind}")
-                imu[kind] = layout[kind] | own
+    for imu in layout.get("imus", {}).values():
+        imu |= {kind: layout[kind] | imu.get(kind, {}) for kind in KINDS}
     return layout
 
 
-def _require_sections(sections: Any, where: str, what: str, schema: dict) -> None:
-    named = isinstance(sections, dict) and sections
-    require(named, where, f"{what} by label", repr(sections))
-    for label, section in sections.items():
-        _require_keys(section, schema["additionalProperties"], f"{where} {label!r}")
-
-
 def _require_keys(section: Any, schema: dict, where: str) -> None:
+    """InputError unless a section, and each section in it, has the schema's keys."""
     keys = {key: key in schema.get("required", ()) for key in schema["properties"]}
     require(isinstance(section, dict), where, _listed(keys), repr(section))
     for key in section:
@@ -90,6 +71,16 @@ def _require_keys(section: Any, schema: dict, where: str) -> None:
         require(key in keys, where, _listed(keys), f"an unknown key {key!r}{hint}")
     for key, needed in keys.items():
         require(key in section or not needed, where, _listed(keys), f"no {key!r}")
+    for key in filter(section.__contains__, keys):
+        known, inner = schema["properties"][key], section[key]
+        place = where if key == "triads" else f"{where}: {key}"
+        if "properties" in known:
+            _require_keys(inner, known, place)
+        elif "additionalProperties" in known:
+            what = "IMUs by label" if key == "imus" else f"{key} by label"
+            require(isinstance(inner, dict) and inner, place, what, repr(inner))
+            for label, own in inner.items():
+                _require_keys(own, known["additionalProperties"], f"{place} {label!r}")
 
 
 def _listed(keys: dict[str, bool]) -> str:
@@ -121,7 +112,7 @@ def _three(value, where: str) -> list[float]:
 def numbers(layout, where: str) -> dict[str, float]:
     """Noise and range of both kinds, and the positions' prior sd, in SI units."""
     out = {}
-    for kind, quantity in QUANTITIES.items():
+    for kind, quantity in KINDS.items():
         section, name = layout[kind], kind.removesuffix("s")
         place = f"{where}: {kind}"
         unit = si_units(section, quantity, place)

@@ -134,7 +134,7 @@ def _sensors(table, layout, kind, where, layout_name):
 
 def unit_of(section, kind, where: str) -> float:
     """SI units in 1 of a kind's columns, by its unit and how many units a count is."""
-    unit = factor(layouts.QUANTITIES[kind], section["unit"], f"{where}: {kind}: unit")
+    unit = factor(layouts.KINDS[kind], section["unit"], f"{where}: {kind}: unit")
     return unit * layouts.positive(section.get("scale", 1.0), f"{where}: {kind}: scale")
 
 
