@@ -103,7 +103,7 @@ def _opened(paths, columns, topics) -> Opened:
         return Opened(read_recording(logs[0]), [])
     if not logs or any(log.suffix in RECORDINGS for log in logs):
         raise InputError(f"logs: expected one recording, or what loggers wrote, found {len(logs)}")
-    if all(map(bags.is_bag, logs)):
+    if all(log.is_dir() or log.suffix.lower() in bags.ENDINGS for log in logs):
         return _together(bags.read_bags(logs, columns, topics), [])
     none = "none: name it by --columns (imuarray columns drafts one)"
     require(columns is not None, str(logs[0]), "a YAML that describes it", none)
@@ -143,7 +143,7 @@ def _sampled(recording: Recording, lines: list[str]) -> Opened:
     from imuarray.alignment.settings import SETTINGS as ALIGNMENT
 
     recording, cleaned = without_garbage(recording)
-    recording, railed = _railed_triads(recording)
+    recording, railed = _railed(recording)
     lines = [*lines, *cleaned, *railed]
     if len(recording.time) < ALIGNMENT.shortest:
         return Opened(recording, lines)
@@ -159,23 +159,19 @@ def _sampled(recording: Recording, lines: list[str]) -> Opened:
 
 def _require_own(log: Log) -> None:
     """InputError for readings that are frozen, held or another's: interpolated, none shows it."""
-    for time, other in (
-        (log.accelerometer_time, log.gyroscope_time), (log.gyroscope_time, log.accelerometer_time)
-    ):  # fmt: skip
+    kinds = [(getattr(log, f"{kind}_time"), getattr(log, name)) for kind, name in KINDS.items()]
+    for (time, _), (other, _) in (kinds, kinds[::-1]):
         both = time[(time >= other[0]) & (time <= other[-1])]
         force, rate = (
             np.stack([np.interp(both, own, axis) for axis in values.T], axis=1)[:, None]
-            for own, values in (
-                (log.accelerometer_time, log.specific_force), (log.gyroscope_time, log.angular_rate)
-            )
-        )  # fmt: skip
+            for own, values in kinds
+        )
         alone = Recording(
             both, force, rate, np.zeros((1, 3)), (log.label,), (log.label,),
             log.accelerometer_noise_sd, log.gyroscope_noise_sd, log.accelerometer_range,
             log.gyroscope_range, 1.0,
         )  # fmt: skip
-        said = repeated(alone)
-        if said:
+        if said := repeated(alone):
             raise InputError(f"{log.label}: expected each reading once, found: {said[0]}")
 
 
@@ -199,36 +195,32 @@ def _require_units(log: Log) -> None:
     )  # fmt: skip
 
 
-def _railed(log: Log) -> tuple[Log, list[str]]:
-    """With the rails that readings show within the declared ranges, and lines that say so."""
-    ranges: dict[str, Any] = {}
-    lines = []
-    for kind, name in KINDS.items():
-        limit, values = getattr(log, f"{kind}_range"), getattr(log, name)
-        (least,) = _rails(values[:, None], limit)
-        if least < limit:
-            ranges[f"{kind}_range"] = least
-            lines.append(_clipped(f"{log.label}: {kind}", kind, least, limit))
-    return replace(log, **ranges), lines
+def _railed(found: Any) -> tuple[Any, list[str]]:
+    """A recording, or a log, with the rails that its readings show within the declared ranges.
 
-
-def _railed_triads(recording: Recording) -> tuple[Recording, list[str]]:
-    """A board's triads, each with rails of its own, and lines that say so."""
+    And lines that say so. A recording's triads have each a rail of their own.
+    """
     changed: dict[str, Any] = {}
     lines = []
     for kind, name in KINDS.items():
-        limit, values = getattr(recording, f"{kind}_range"), getattr(recording, name)
-        rails = _rails(values, limit)
+        limit, values = getattr(found, f"{kind}_range"), getattr(found, name)
+        rails = _rails(values.reshape(len(values), -1, 3), limit)
         if (rails == limit).all():
             continue
-        known = getattr(recording, f"saturated_{kind}s")()
-        changed[f"{name}_saturated"] = known | (np.abs(values) >= RAIL * rails[:, None])
         changed[f"{kind}_range"] = rails.max()
-        labels = getattr(recording, f"{kind}_labels")
+        if isinstance(found, Recording):
+            known = getattr(found, f"saturated_{kind}s")()
+            changed[f"{name}_saturated"] = known | (np.abs(values) >= RAIL * rails[:, None])
         for rail in np.unique(rails[rails < limit]):
-            whose = ", ".join(labels[k] for k in np.flatnonzero(rails == rail))
-            lines.append(_clipped(f"{kind} {whose}", kind, rail, limit))
-    return replace(recording, **changed), lines
+            whose = f"{found.label}: {kind}" if isinstance(found, Log) else f"{kind} " + ", ".join(
+                np.array(getattr(found, f"{kind}_labels"))[rails == rail]
+            )  # fmt: skip
+            unit = "m/s^2" if kind == "accelerometer" else f"rad/s ({np.degrees(rail):.4g} deg/s)"
+            lines.append(
+                f"{whose}: clipped at {rail:.4g} {unit}, within its declared range of {limit:.4g}:"
+                " that is taken for its range"
+            )
+    return replace(found, **changed), lines
 
 
 def _rails(values, limit: float) -> np.ndarray:
@@ -237,12 +229,4 @@ def _rails(values, limit: float) -> np.ndarray:
     found = [[abs(end) for axis in own.T for end in ends(axis)] for own in values.swapaxes(0, 1)]
     return np.array(
         [min((end for end in own if least < end < RAIL * limit), default=limit) for own in found]
-    )
-
-
-def _clipped(whose: str, kind: str, rail: float, limit: float) -> str:
-    unit = "m/s^2" if kind == "accelerometer" else f"rad/s ({np.degrees(rail):.4g} deg/s)"
-    return (
-        f"{whose}: clipped at {rail:.4g} {unit}, within its declared range of {limit:.4g}: that is"
-        " taken for its range"
     )
