@@ -16,8 +16,8 @@ from imuarray.alignment.settings import SETTINGS
 from imuarray.errors import InputError, require
 from imuarray.firstorder.rails import rails_shown
 from imuarray.firstorder.turns import angle_of
-from imuarray.recording import Recording
-from imuarray.recording.record import RAIL, pieces
+from imuarray.recording import Recording, record
+from imuarray.recording.record import pieces
 from imuarray.recording.rig import Log
 
 
@@ -29,9 +29,8 @@ def steadied(time, values, enough: float = 1.0) -> tuple[np.ndarray, float]:
     smoother. Else the stamps.
     """
     steps = np.diff(time)
-    even = np.concatenate(
-        [_paced(time[part]) for part in pieces(steps > SETTINGS.run * np.median(steps))]
-    )
+    parts = pieces(steps > SETTINGS.run * np.median(steps))
+    even = np.concatenate([_paced(time[part]) for part in parts])
     off = float(np.sqrt(np.mean((even - time) ** 2)))
     if (np.diff(even) <= 0).any() or _roughness(even, values) > enough * _roughness(time, values):
         return time, 0.0
@@ -49,9 +48,8 @@ def _paced(time) -> np.ndarray:
     # Where stamps jitter by half a step, rounding would see gaps that are none.
     tried = [_line(time, number, pace) for number in (every, missed) for pace in SETTINGS.paces]
     lines = [found for _, found in tried[:: len(SETTINGS.paces)]]
-    if (
-        len(np.unique(np.round(usual, 7))) <= SETTINGS.rounded
-    ):  # a spline would follow the rounding's jumps
+    rounded = len(np.unique(np.round(usual, 7))) <= SETTINGS.rounded
+    if rounded:  # a spline would follow the rounding's jumps
         lines = [found for found in lines if np.abs(found - time).max() <= np.ptp(usual)]
         tried = [(0.0, found) for found in lines[:1]] or tried
     return min(tried, key=lambda one: one[0])[1]
@@ -108,8 +106,7 @@ def align(
         for pair, clock in zip(pairs, clocks, strict=True) for sensor in pair
     ]  # fmt: skip
     grid, step = _grid(sensors)
-    knots = [_knots(sensor, grid, step) for sensor in sensors]
-    facts = [_carried(*both, grid) for both in zip(sensors, knots, strict=True)]
+    knots, facts = zip(*(_carried(sensor, grid, step) for sensor in sensors), strict=True)
     recording, whole = _recording(logs, rotation, grid, sensors, knots)
     noise = np.sqrt(np.mean(np.reshape([one.noise_sd**2 for one in facts], (-1, 2)), axis=0))
     both = np.hypot(gyroscopes[0].noise_sd, [g.noise_sd for g in gyroscopes])
@@ -134,35 +131,32 @@ def _sensors(logs: Sequence[Log]) -> tuple[list[tuple[Sensor, Sensor]], list[flo
     require(len(logs) >= 2, "logs", "two IMUs at least", len(logs))
     out, origins = [], []
     for log in logs:
-        parts = (
-            (log.accelerometer_time, log.specific_force, log.accelerometer_range,
-             log.accelerometer_noise_sd),
-            (log.gyroscope_time, log.angular_rate, log.gyroscope_range, log.gyroscope_noise_sd),
-        )  # fmt: skip
-        for kind, (time, *_) in zip(KINDS, parts, strict=True):
-            name, count = f"{kind} {log.label!r}", len(time)
-            require(
-                count >= SETTINGS.shortest, name, f"{SETTINGS.shortest} readings at least", count
-            )
+        parts = [
+            (f"{kind} {log.label!r}", getattr(log, f"{kind}_time"), getattr(log, values),
+             getattr(log, f"{kind}_range"), getattr(log, f"{kind}_noise_sd"))
+            for kind, values in record.KINDS.items()
+        ]  # fmt: skip
+        for name, time, *_ in parts:
+            count = len(time)
+            expected = f"{SETTINGS.shortest} readings at least"
+            require(count >= SETTINGS.shortest, name, expected, count)
             step, lasts = np.quantile(np.diff(time), 0.99), time[-1] - time[0]
             paused = step > 0 and lasts > SETTINGS.paused * count * step
             days = f"within {lasts / 86400:.3g} days"
             found = f"{count} readings {step:.3g} s apart or less {days}"
             require(not paused, name, "stamps of one recording", found)
-        origins.append(float(min(part[0][0] for part in parts)))
+        origins.append(float(min(time[0] for _, time, *_ in parts)))
         out.append(tuple(
-            Sensor(f"{kind} {log.label!r}", *steadied(time - origins[-1], values), values,
-                   np.abs(values) >= RAIL * limit, noise)
-            for kind, (time, values, limit, noise) in zip(KINDS, parts, strict=True)
+            Sensor(name, *steadied(time - origins[-1], values), values,
+                   np.abs(values) >= record.RAIL * limit, noise)
+            for name, time, values, limit, noise in parts
         ))  # fmt: skip
     return out, origins
 
 
 def _ahead(logs, gyroscopes, origins) -> list[float]:
     """By how much (s) the first log begins later than each other, 0 where stamps do not tell."""
-    ends = [
-        origin + gyroscope.time[-1] for origin, gyroscope in zip(origins, gyroscopes, strict=True)
-    ]
+    ends = [start + one.time[-1] for start, one in zip(origins, gyroscopes, strict=True)]
     return [
         origins[0] - origin
         if log.epoch == logs[0].epoch and origin < ends[0] and origins[0] < end else 0.0
@@ -198,25 +192,20 @@ def _require_common(count: int) -> None:
     require(count >= SETTINGS.shortest, "logs", expected, count)
 
 
-def _knots(sensor: Sensor, grid, step: float) -> np.ndarray | None:
-    """The grid where a sensor is averaged: a faster one, where that misses nothing to speak of.
+def _carried(sensor: Sensor, grid, step: float) -> tuple[np.ndarray | None, Carried]:
+    """The grid as knots where a sensor is averaged, or None; and how well it is carried over.
 
-    What it and the slowest one keep of the motion is the same then, and no reading is thrown away.
+    Averaged is a faster one, where that misses nothing to speak of. What it and the slowest one
+    keep of the motion is the same then, and no reading is thrown away.
     """
     left = sensor.noise_sd * np.sqrt(sensor.step / step)
-    averaged = (
-        SETTINGS.slower * sensor.step < step
-        and sensor.error(step) < SETTINGS.averaging_missed * left
-    )
-    return grid if averaged else None
-
-
-def _carried(sensor: Sensor, knots, grid) -> Carried:
-    spacing = sensor.step if knots is None else knots[1] - knots[0]
+    faster, missed = SETTINGS.slower * sensor.step < step, SETTINGS.averaging_missed * left
+    averaged = faster and sensor.error(step) < missed
+    knots, spacing = (grid, grid[1] - grid[0]) if averaged else (None, sensor.step)
     # any white noise shows what is left of it
     white = np.random.default_rng(0).standard_normal(sensor.values.shape)
     noise = sensor.noise_sd * np.sqrt(np.nanmean(Splines(sensor, white, knots)(grid) ** 2))
-    return Carried(1 / sensor.step, sensor.jitter, sensor.error(spacing), noise)
+    return knots, Carried(1 / sensor.step, sensor.jitter, sensor.error(spacing), noise)
 
 
 def _of_stamps(clocks, gyroscopes, origins) -> tuple[Clock, ...]:

@@ -134,11 +134,8 @@ class Alignment:
 
 def _with(value: float, sd: float) -> str:
     """A value with its sd to two digits; a bound where that is less than SMALLEST."""
-    if sd < SETTINGS.smallest_sd:
-        return (
-            f"{value:.4f} +- < {SETTINGS.smallest_sd:.4f}"
-            if value >= SETTINGS.smallest_sd
-            else f"< {SETTINGS.smallest_sd:.4f}"
-        )
+    least = SETTINGS.smallest_sd
+    if sd < least:
+        return f"{value:.4f} +- < {least:.4f}" if value >= least else f"< {least:.4f}"
     digits = int(np.clip(1 - np.floor(np.log10(sd)), 0, 4))
     return f"{value:.{digits}f} +- {sd:.{digits}f}"

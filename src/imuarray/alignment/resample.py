@@ -47,10 +47,7 @@ class Sensor:
             if len(time) > 2 * SETTINGS.degree and (np.diff(time) > 1.5 * self.step).any():
                 at = np.arange(time[0], time[-1], self.step)
                 nearest = np.searchsorted((time[1:] + time[:-1]) / 2, at)
-                values, railed = (
-                    make_interp_spline(time, values, SETTINGS.degree)(at),
-                    railed[nearest],
-                )
+                values, railed = _spline(time, values)(at), railed[nearest]
             found.append((values, railed))
         return found
 
@@ -98,9 +95,8 @@ class Sensor:
     @cached_property
     def longest(self) -> float:
         """Usual steps between neighbours that the motion is slow enough to bridge."""
-        allowed = [
-            n for n in range(2, SETTINGS.widest + 1) if self.error(n * self.step) < self.noise_sd
-        ]
+        steps = range(2, SETTINGS.widest + 1)
+        allowed = (n for n in steps if self.error(n * self.step) < self.noise_sd)
         return 0.5 + max(allowed, default=1)
 
     def near_rail(self, at, spacing: float = 0.0) -> np.ndarray:
@@ -146,7 +142,7 @@ class Splines:
         return found
 
 
-def _spline(time, values, knots) -> BSpline:
+def _spline(time, values, knots=None) -> BSpline:
     """Through a run, or by least squares on the knots that are within it."""
     inner = np.zeros(0) if knots is None else knots[(knots > time[0]) & (knots < time[-1])][2:-2]
     if len(inner):

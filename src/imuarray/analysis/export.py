@@ -175,14 +175,11 @@ def _times(calibration: xr.Dataset, model: ArrayModel) -> dict[str, tuple]:
         own = np.array([calibration[f"clock_offset{part}"].to_numpy() for part in ("", "_sd")])
     for kind, rows in weights.items():
         against = rows - weights[KINDS[0]][0]
-        variances = (
-            np.einsum("ki,ij,kj->k", against, covariance, against) + own[1][: len(rows)] ** 2
-        )
+        clock, clock_sd = own[:, : len(rows)]
+        variances = np.einsum("ki,ij,kj->k", against, covariance, against) + clock_sd**2
         # what was held fixed has no sd
-        out[kind] = (
-            against @ found - own[0][: len(rows)],
-            np.sqrt(np.where(variances > 0, variances, np.nan)),
-        )
+        sds = np.sqrt(np.where(variances > 0, variances, np.nan))
+        out[kind] = against @ found - clock, sds
     return out
 
 

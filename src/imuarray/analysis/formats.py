@@ -129,9 +129,8 @@ def csv(document: dict[str, Any]) -> str:
         for kind in ("accelerometer", "gyroscope"):
             for name in ("time_offset_s", "time_offset_sd_s"):
                 row[f"{kind}_{name}"] = imu.get(kind, {}).get(name)
-        rows.append(
-            row | {"trusted": document["trusted"], "reasons": "; ".join(document["reasons"])}
-        )
+        reasons = "; ".join(document["reasons"])
+        rows.append(row | {"trusted": document["trusted"], "reasons": reasons})
     return pd.DataFrame(rows).to_csv(index=False, lineterminator="\n")
 
 
@@ -173,15 +172,13 @@ def kalibr(document: dict[str, Any]) -> str:
         label, force, own = printable(imu["label"]), imu["accelerometer"], imu["kalibr"]
         lines += [f"imu{number}: # {label}", "  model: scale-misalignment"]
         lines += _matrix("  T_i_b", own["T_i_b"])
-        lines[-1] += (
-            f" # C: {_sds(own['T_i_b_turn_sd_rad'])} rad; place: {_sds(imu['position_sd_m'])} m"
-        )
+        turn, place = _sds(own["T_i_b_turn_sd_rad"]), _sds(imu["position_sd_m"])
+        lines[-1] += f" # C: {turn} rad; place: {place} m"
         lines += [_scalar("  time_offset", force["time_offset_s"], force["time_offset_sd_s"])]
         if imu["clock"]:
             drift, sd, at = (imu["clock"][name] for name in ("drift", "drift_sd", "at_s"))
-            lines += [
-                f"  # that is at the stamp {at:.6f}; it falls by {drift:.4g} (sd {sd:.2g}) a second"
-            ]
+            falls = f"it falls by {drift:.4g} (sd {sd:.2g}) a second"
+            lines.append(f"  # that is at the stamp {at:.6f}; {falls}")
         lines += [_scalar("  update_rate", imu["rate_hz"] or document["rate_hz"])]
         topic = label if label.startswith("/") else f"/imu{number}"
         lines += [f"  rostopic: {dumps(topic)}"]

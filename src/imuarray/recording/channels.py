@@ -64,11 +64,7 @@ def dead(recording: Recording) -> list[str]:
     """A sentence for each axis that hardly changes, and for each triad or axis that is a copy."""
     if len(recording.time) < SETTINGS.least_samples:
         return []
-    return [
-        sentence
-        for kind in KINDS
-        for sentence in (*_constant(recording, kind), *_copied(recording, kind))
-    ]
+    return [x for kind in KINDS for x in (*_constant(recording, kind), *_copied(recording, kind))]
 
 
 def repeated(recording: Recording) -> list[str]:
@@ -135,12 +131,9 @@ def _copied(recording: Recording, kind: str) -> list[str]:
     marks[other] = np.arange(1, 1 + other.sum())  # named already, or alike for another reason
     first: dict[int, int] = {}
     of = [first.setdefault(int(mark), place) for place, mark in enumerate(marks)]
-    return found + [
-        f"{kind} {labels[place // 3]!r}, axis {AXES[place % 3]}, reads what"
-        f" {labels[same // 3]!r}, axis {AXES[same % 3]}, reads"
-        for place, same in enumerate(of)
-        if same != place
-    ]
+    named = [f"{label!r}, axis {axis}, reads" for label in labels for axis in AXES]
+    pairs = ((named[place], named[same]) for place, same in enumerate(of) if same != place)
+    return found + [f"{kind} {one} what {other}" for one, other in pairs]
 
 
 def _sums(recording: Recording, kind: str):

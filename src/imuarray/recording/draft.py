@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Sequence
-from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -86,13 +85,12 @@ def draft(paths: Sequence[Path]) -> tuple[str, list[str]]:
         if sensor:
             parts.insert(2, f"sensor: {_quoted(sensor)}  # the column that numbers the IMUs")
         parts += ["imus:"] + [f'  "{label}": {{}}  # position: [?, ?, ?]' for label in labels]
-    asked += ["columns: no header; whose they are is guessed by gravity at rest"] * (
-        first.columns[0] == "1"
-    )
+    if first.columns[0] == "1":
+        asked.append("columns: no header; whose they are is guessed by gravity at rest")
     asked.append("positions: from the drawing, else they begin from the motion")
-    return "\n".join(parts) + "\n", asked + ["axes: where a chip is turned on the board"] * (
-        len(paths) == 1
-    )
+    if len(paths) == 1:
+        asked.append("axes: where a chip is turned on the board")
+    return "\n".join(parts) + "\n", asked
 
 
 def _labels_of(paths) -> list[str]:
@@ -120,9 +118,7 @@ def _read(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
     go by their place from 1.
     """
     with expecting(path, "a CSV file with a header", written.UNREADABLE):
-        encoding = written.encoding_of(path)
-        with written.opened(path, "rt", encoding=encoding, errors="replace") as file:
-            lines = [line.rstrip("\n") for line in islice(file, SETTINGS.head)]
+        _, lines = written.head_of(path)
     found = (_header(lines, sep) for sep in written.DELIMITERS)
     width, number, sep = max(found, key=lambda one: one[0])
     if width < 0:
@@ -231,10 +227,8 @@ def _time(table: pd.DataFrame, given: dict[str, str]) -> tuple[str, float, list[
         stamped = np.mean(steps > 0) > SETTINGS.draft_stamped if len(steps) else False
         step = float(np.median(steps[steps > 0])) if stamped else np.nan
         hint = re.search(r"(?:\b|_)(ns|us|ms|s)(?:\b|_)", f"{name} {given.get(name)}".lower())
-        likely = [
-            u for u, size in units.items()
-            if SETTINGS.slowest <= 1 / (step * size) <= SETTINGS.fastest / 5
-        ]  # fmt: skip
+        least, most = SETTINGS.slowest, SETTINGS.fastest / 5
+        likely = [u for u, size in units.items() if least <= 1 / (step * size) <= most]
         likely.sort(key=lambda u: abs(np.log(step * units[u] * SETTINGS.draft_rate)))
         likely = [u for u in likely if hint and u == hint[1]] or likely
         if likely:
@@ -314,9 +308,8 @@ def _force(still) -> tuple[str, float | None]:
         if abs(size / one - 1) < SETTINGS.draft_gravity:
             return unit, None
     nearest = COUNTS[np.argmin(np.abs(np.log(COUNTS / max(size, 1e-300))))]
-    return (
-        ("g", 1 / nearest) if abs(size / nearest - 1) < SETTINGS.draft_gravity else (UNKNOWN, None)
-    )
+    raw = abs(size / nearest - 1) < SETTINGS.draft_gravity
+    return ("g", 1 / nearest) if raw else (UNKNOWN, None)
 
 
 def _number(value: float, digits: int) -> str:

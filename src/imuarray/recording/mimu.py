@@ -7,6 +7,7 @@ big endian. Acknowledgements (A0, a byte, their 16-bit sum) may stand between pa
 
 import lzma
 from bisect import bisect_left
+from collections import deque
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -266,15 +267,14 @@ def _joined(number, stamp, period, linked) -> np.ndarray:
         step, ticks = (number[other] - number[one]) % NUMBERS, (stamp[other] - stamp[one]) % WRAP
         return bool(_agree(step, ticks, period))
 
-    kept = list(range(best.start, best.stop))
+    kept = deque(range(best.start, best.stop))
     for i in range(best.stop, len(number)):
         if fits(kept[-1], i):
             kept.append(i)
-    before = []
     for i in range(best.start - 1, -1, -1):
-        if fits(i, before[-1] if before else kept[0]):
-            before.append(i)
-    return np.array(before[::-1] + kept)
+        if fits(i, kept[0]):
+            kept.appendleft(i)
+    return np.array(kept)
 
 
 def _account(data, accepted, size, strangers, number) -> Account:

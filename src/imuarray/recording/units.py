@@ -25,10 +25,8 @@ def require_plausible_rate(time, where: str, declared: object = "") -> None:
     """InputError for stamps (T,) s that no IMU makes: a unit; ``declared``: theirs, if known."""
     steps = np.abs(np.diff(time))
     steps = steps[steps > 0]
-    if (
-        not steps.size
-        or 1 / SETTINGS.fastest <= (step := float(np.median(steps))) <= 1 / SETTINGS.slowest
-    ):
+    step = float(np.median(steps)) if steps.size else 1 / SETTINGS.slowest
+    if 1 / SETTINGS.fastest <= step <= 1 / SETTINGS.slowest:
         return
     # the unit in which they would be plausible, from the last one that they were taken to be in
     units = UNITS["time"]

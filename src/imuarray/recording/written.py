@@ -41,16 +41,13 @@ def form_of(path: Path, named: set[str], given: dict) -> tuple[dict, list[str]]:
     Without one, where all columns go by their place from 1, the table begins with the first line
     of numbers as wide as most.
     """
-    encoding = encoding_of(path)
-    with opened(path, "rt", encoding=encoding, errors="replace", newline=None) as file:
-        lines = [line.rstrip("\n") for line in islice(file, SETTINGS.head)]
+    encoding, lines = head_of(path)
     asked = given.get("sep")
-    best, skip, sep = 0, 0, asked or ","
-    for number, line in enumerate(lines):
-        for delimiter in [asked] if asked else DELIMITERS:
-            found = len(named & set(cells_of(line, delimiter)))
-            if found > best:
-                best, skip, sep = found, number, delimiter
+    tried = (
+        (len(named & set(cells_of(line, delimiter))), number, delimiter)
+        for number, line in enumerate(lines) for delimiter in ([asked] if asked else DELIMITERS)
+    )  # fmt: skip
+    best, skip, sep = max(tried, key=lambda one: one[0], default=(0, 0, asked or DELIMITERS[0]))
     headless = best < len(named) and all(name.isdigit() for name in named)
     if headless:
         skip, sep = begin_of(lines, asked)
@@ -131,20 +128,20 @@ def plain(value) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def encoding_of(path: Path) -> str:
-    """By the byte-order mark, or by what the first bytes can be read as."""
+def head_of(path: Path) -> tuple[str, list[str]]:
+    """(encoding, first lines), by the byte-order mark or by what the first bytes can be read as."""
     with opened(path) as file:
         start = file.read(SETTINGS.sniffed)
     sheet = "a spreadsheet, or an archive: save it as CSV"
     require(not start.startswith(b"PK\3\4"), str(path), "text, such as CSV", sheet)
-    for mark, name in MARKS.items():
-        if start.startswith(mark):
-            return name
+    encoding = next((name for mark, name in MARKS.items() if start.startswith(mark)), "utf-8")
     try:
-        start[:-4].decode("utf-8")  # the last character may be cut
+        if encoding == "utf-8":
+            start[:-4].decode()  # the last character may be cut
     except UnicodeDecodeError:
-        return "utf-8" if b"\0" in start else "cp1252"
-    return "utf-8"
+        encoding = "utf-8" if b"\0" in start else "cp1252"
+    with opened(path, "rt", encoding=encoding, errors="replace", newline=None) as file:
+        return encoding, [line.rstrip("\n") for line in islice(file, SETTINGS.head)]
 
 
 def seconds_of_dates(cells: pd.Series) -> np.ndarray | None:
@@ -227,24 +224,20 @@ def _carried_on(stamps) -> tuple[np.ndarray, str]:
 def shared_words(steps, table: pd.DataFrame) -> str:
     """Words on many rows that share their stamps: bursts, ticks, or one row for each sensor."""
     share = f"expected a stamp of its own for each row, found {np.mean(steps == 0):.0%} of the rows"
-    if name := numbering(table):
-        return (
-            f"{share} with the same stamp, and a column {name!r} that numbers the sensors: one row"
-            f" for each sensor; expected `sensor: {name}` and `imus` by its numbers"
-        )
-    return (
-        f"{share} with the same stamp: bursts of packets, or ticks of a coarse clock; log the"
-        " sensors' own clock, or declare `time: rate`"
-    )
+    why = (
+        f", and a column {name!r} that numbers the sensors: one row for each sensor; expected"
+        f" `sensor: {name}` and `imus` by its numbers" if (name := numbering(table))
+        else ": bursts of packets, or ticks of a coarse clock; log the sensors' own clock, or"
+        " declare `time: rate`"
+    )  # fmt: skip
+    return f"{share} with the same stamp{why}"
 
 
 def numbering(table: pd.DataFrame) -> str:
     """The column whose few values come equally often, as numbers of sensors do, or ""."""
     for place, name in enumerate(table.columns):
         counts = table.iloc[:, place].value_counts()
-        if (
-            1 < len(counts) <= SETTINGS.most_sensors
-            and counts.min() > 0.9 * counts.max() > SETTINGS.few_rows
-        ):
+        few = 1 < len(counts) <= SETTINGS.most_sensors
+        if few and counts.min() > 0.9 * counts.max() > SETTINGS.few_rows:
             return str(name)
     return ""
