@@ -111,12 +111,8 @@ def _fail(message: object, status: int = BAD_INPUT) -> int:
 @contextmanager
 def _warnings_in_one_line() -> Iterator[None]:
     """A warning is for the user of the command, who did not write the line it comes from."""
-
-    def formatted(message: Warning | str, *_where: object, **__: object) -> str:
-        return f"imuarray: warning: {one_line(message)}\n"
-
     before = warnings.formatwarning
-    warnings.formatwarning = formatted
+    warnings.formatwarning = lambda message, *_, **__: f"imuarray: warning: {one_line(message)}\n"
     try:
         yield
     finally:
@@ -182,10 +178,8 @@ def _require_writable(out: Path, folder: bool) -> None:
     require(parent.is_dir(), where, "a folder", f"the file {parent}")
     require(os.access(parent, os.W_OK | os.X_OK), where, "a folder one may write to", parent)
     if folder:
-        if os.path.lexists(out) and not out.is_dir():
-            found = "a file" if out.exists() else "a link to nothing"
-            raise InputError(f"{where}: expected a folder, found {found}")
-        return
+        found = "a file" if out.exists() else "a link to nothing"
+        return require(out.is_dir() or not os.path.lexists(out), where, "a folder", found)
     from imuarray.provenance import target_of
 
     try:

@@ -2,5 +2,3 @@
 
 from imuarray.alignment.align import align
 from imuarray.alignment.found import Alignment
-
-__all__ = ["Alignment", "align"]

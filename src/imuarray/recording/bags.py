@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from imuarray.errors import InputError, expecting, require
-from imuarray.recording.layout import KINDS, read_layout, si_units
+from imuarray.recording.layout import KINDS, read_layout, unit_of
 from imuarray.recording.rig import Readings, Rig, pair, to_rig
 
 ENDINGS = (".bag", ".mcap", ".db3")  # or a folder
@@ -74,8 +74,8 @@ def _readings(parts: dict[str, list], topic: str, kind: int, imu, where: str) ->
     stamps, values = (np.concatenate(part) for part in zip(*joined, strict=True))
     found = f"none (0) in {np.sum(stamps == 0)} of {len(stamps)}"
     require(stamps.all(), topic, "stamps in the messages' headers", found)
-    name, quantity = list(KINDS.items())[kind]
-    unit = si_units(imu[name], quantity, f"{where}: {name}")
+    name = list(KINDS)[kind]
+    unit = unit_of(imu[name], name, where)
     return Readings(stamps, 1e-9, unit * values[:, 3 * kind : 3 * kind + 3], topic)
 
 

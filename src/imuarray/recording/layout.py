@@ -11,7 +11,7 @@ import yaml
 
 from imuarray.errors import LARGEST, SMALLEST, expecting, require
 from imuarray.recording.settings import SETTINGS
-from imuarray.recording.units import factor
+from imuarray.recording.units import SI, factor
 from imuarray.recording.validate import is_rotation
 
 KINDS = {"accelerometers": "force", "gyroscopes": "rate"}
@@ -115,7 +115,7 @@ def numbers(layout, where: str) -> dict[str, float]:
     for kind, quantity in KINDS.items():
         section, name = layout[kind], kind.removesuffix("s")
         place = f"{where}: {kind}"
-        unit = si_units(section, quantity, place)
+        unit = factor(quantity, section.get("unit", SI[quantity]), f"{place}: unit")
         for key, attribute in (("noise", "noise_sd"), ("range", "range")):
             value = positive(section[key], f"{place}: {key}")
             out[f"{name}_{attribute}"] = unit * value
@@ -126,9 +126,10 @@ def numbers(layout, where: str) -> dict[str, float]:
     return out | {"position_prior_sd": length * prior}
 
 
-def si_units(section, quantity: str, where: str) -> float:
-    """A section's unit in SI units; a bag's are SI units where it names none."""
-    return factor(quantity, section["unit"], f"{where}: unit") if "unit" in section else 1.0
+def unit_of(section, kind: str, where: str) -> float:
+    """SI units in 1 of a kind's readings, by its unit and how many units a count is."""
+    unit = factor(KINDS[kind], section.get("unit", SI[KINDS[kind]]), f"{where}: {kind}: unit")
+    return unit * positive(section.get("scale", 1.0), f"{where}: {kind}: scale")
 
 
 def positions(sections: dict[str, dict], layout, where: str) -> np.ndarray:

@@ -14,7 +14,7 @@ import xarray as xr
 
 from imuarray.errors import InputError
 from imuarray.geometry import Array
-from imuarray.recording.units import UNITS
+from imuarray.recording import units
 
 PART = 2**15  # samples: 50 MB of 32 IMUs
 MAX_VALUES = 200_000_000  # 1.6 GB as float64: what is held in memory at once
@@ -56,7 +56,7 @@ QUANTITIES = {
     "time": "time", "specific_force": "force", "angular_rate": "rate",
     "accelerometer_position": "length",
 }  # fmt: skip
-SI = {name: next(iter(UNITS[quantity])) for name, quantity in QUANTITIES.items()}
+SI = {name: units.SI[quantity] for name, quantity in QUANTITIES.items()}
 # Attributes that are positive numbers, and their units.
 NUMBERS = {
     "accelerometer_noise_sd": "m s-2",
@@ -227,9 +227,9 @@ class Recording:
     def to_dataset(self) -> xr.Dataset:
         """The recording as the file holds it, rates in rad/s; InputError for shapes at odds."""
         types = dict.fromkeys(SI, float) | dict.fromkeys(FLAGS, bool) | dict.fromkeys(MATRICES)
-        units = {name: {"units": SI.get(name, "1")} for name in (*SI, *MATRICES)}
+        attrs = {name: {"units": SI.get(name, "1")} for name in (*SI, *MATRICES)}
         variables = {
-            name: (DIMENSIONS[name], np.asarray(values, kind), units.get(name, {}))
+            name: (DIMENSIONS[name], np.asarray(values, kind), attrs.get(name, {}))
             for name, kind in types.items() if (values := getattr(self, name)) is not None
         }  # fmt: skip
         if self.correction is not None:

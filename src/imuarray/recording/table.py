@@ -121,7 +121,7 @@ def column(table, name, where, blank: bool = False) -> np.ndarray:
 def _sensors(table, layout, kind, where, layout_name):
     """Readings (T, K, 3) in SI units in the array frame, and the labels."""
     section = layout[kind]
-    unit, parts = unit_of(section, kind, layout_name), []
+    unit, parts = layouts.unit_of(section, kind, layout_name), []
     for label, triad in section["triads"].items():
         place = f"{layout_name}: {kind} {label!r}"
         names = layouts.three_columns(triad["columns"], place)
@@ -130,12 +130,6 @@ def _sensors(table, layout, kind, where, layout_name):
         with np.errstate(over="ignore", invalid="ignore"):
             parts.append(unit * own @ _turn(triad, place).T)
     return np.stack(parts, axis=1), tuple(str(label) for label in section["triads"])
-
-
-def unit_of(section, kind, where: str) -> float:
-    """SI units in 1 of a kind's columns, by its unit and how many units a count is."""
-    unit = factor(layouts.KINDS[kind], section["unit"], f"{where}: {kind}: unit")
-    return unit * layouts.positive(section.get("scale", 1.0), f"{where}: {kind}: scale")
 
 
 def _turn(triad, where: str) -> np.ndarray:
@@ -225,7 +219,7 @@ def _read(loaded, layout, imus: dict[str, dict], name: str) -> Rig:
     read, unused, stamped = {}, list(loaded), True
     for label, imu in imus.items():
         where = f"{name}: imus {label!r}"
-        units = [unit_of(imu[kind], kind, where) for kind in layouts.KINDS]
+        units = [layouts.unit_of(imu[kind], kind, where) for kind in layouts.KINDS]
         paths = [_file(log, label, list(loaded), where) for log in pair(imu.get("log"))]
         times = pair(imu.get("time", layout.get("time")))
         stamped &= len(loaded) == 1 or not any(isinstance(t, dict) and "rate" in t for t in times)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from imuarray.errors import InputError, require
+from imuarray.errors import require
 from imuarray.recording.settings import SETTINGS
 
 GRAVITY = 9.80665  # m/s^2, the unit g of data sheets
@@ -19,24 +19,24 @@ UNITS = {
         "mdeg/s": 1e-3 * _DEGREE, "mdps": 1e-3 * _DEGREE,
     },
 }  # fmt: skip
+SI = {quantity: next(iter(known)) for quantity, known in UNITS.items()}
 
 
 def require_plausible_rate(time, where: str, declared: object = "") -> None:
     """InputError for stamps (T,) s that no IMU makes: a unit; ``declared``: theirs, if known."""
     steps = np.abs(np.diff(time))
     steps = steps[steps > 0]
-    step = float(np.median(steps)) if steps.size else 1 / SETTINGS.slowest
-    if 1 / SETTINGS.fastest <= step <= 1 / SETTINGS.slowest:
+    if not steps.size:
         return
+    step = float(np.median(steps))
     # the unit in which they would be plausible, from the last one that they were taken to be in
     units = UNITS["time"]
     right = [u for u, size in units.items() if 1e-4 <= step * size / units.get(declared, 1.0) < 0.2]
     hint = f"are they in {right[0]}" if right else "is their unit right"
     hint += f", declared {declared}?" if declared and right else "?"
-    raise InputError(
-        f"{where}: expected stamps of {SETTINGS.slowest:g} to {SETTINGS.fastest:g} samples a"
-        f" second, found {1 / step:.3g} over {np.ptp(time):.6g} s; {hint}"
-    )
+    usual = 1 / SETTINGS.fastest <= step <= 1 / SETTINGS.slowest
+    expected = f"stamps of {SETTINGS.slowest:g} to {SETTINGS.fastest:g} samples a second"
+    require(usual, where, expected, f"{1 / step:.3g} over {np.ptp(time):.6g} s; {hint}")
 
 
 def factor(quantity: str, unit: object, where: str) -> float:

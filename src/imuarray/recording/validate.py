@@ -28,19 +28,17 @@ def check_sizes(file: h5py.File, where: str, whole: bool = True) -> None:
     Unless it is read as a ``whole``, readings may be as many as the file has room for.
     """
 
-    def visit(name: str, item: Any) -> tuple[str, tuple[int, ...]] | None:
+    def visit(name: str, item: Any) -> None:
         # Python's integers: the declared sizes may overflow 64 bits
         shape = tuple(int(n) for n in getattr(item, "shape", None) or ())
         stays = not whole and name in record.SAMPLED and len(shape) > 1
         room = INFLATED * item.id.get_storage_size() if stays else 0
-        large = math.prod(shape) > max(record.MAX_VALUES, room)
-        return (name, shape) if large else None
-
-    if found := file.visititems(visit):
-        name, shape = found
-        raise InputError(
-            f"{where}: {name}: expected at most {record.MAX_VALUES} values, found shape {shape}"
+        least, expected = math.prod(shape), f"at most {record.MAX_VALUES} values"
+        require(
+            least <= max(record.MAX_VALUES, room), f"{where}: {name}", expected, f"shape {shape}"
         )
+
+    file.visititems(visit)
 
 
 def check_structure(dataset: xr.Dataset, where: str) -> None:
