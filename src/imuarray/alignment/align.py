@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline, make_lsq_spline
 
 from imuarray.alignment.clocks import Clock, compare
-from imuarray.alignment.found import KINDS, Alignment, Carried
+from imuarray.alignment.found import KINDS, Alignment
 from imuarray.alignment.resample import Sensor, Splines
 from imuarray.alignment.settings import SETTINGS
 from imuarray.errors import InputError, require
@@ -108,7 +108,7 @@ def align(
     grid, step = _grid(sensors)
     knots, facts = zip(*(_carried(sensor, grid, step) for sensor in sensors), strict=True)
     recording, whole = _recording(logs, rotation, grid, sensors, knots)
-    noise = np.sqrt(np.mean(np.reshape([one.noise_sd**2 for one in facts], (-1, 2)), axis=0))
+    noise = np.sqrt(np.mean(np.reshape([noise**2 for *_, noise in facts], (-1, 2)), axis=0))
     both = np.hypot(gyroscopes[0].noise_sd, [g.noise_sd for g in gyroscopes])
     agreement = np.array([np.nan, *(clock.residual for clock in clocks[1:])]) / both
     unknown = np.full((3, 3), np.nan)
@@ -117,7 +117,7 @@ def align(
         recording.accelerometer_labels, rotation,
         angle_of(np.swapaxes(rotation, 1, 2) @ declared),
         _of_stamps(clocks, gyroscopes, origins), agreement,
-        tuple(zip(facts[::2], facts[1::2], strict=True)), step, origins[0], int(whole.sum()),
+        np.reshape(facts, (-1, 2, 4)), step, origins[0], int(whole.sum()),
         int((~whole).sum()), np.array([log.epoch for log in logs]), tuple(_ends(sensors)),
     )  # fmt: skip
     return replace(
@@ -192,8 +192,8 @@ def _require_common(count: int) -> None:
     require(count >= SETTINGS.shortest, "logs", expected, count)
 
 
-def _carried(sensor: Sensor, grid, step: float) -> tuple[np.ndarray | None, Carried]:
-    """The grid as knots where a sensor is averaged, or None; and how well it is carried over.
+def _carried(sensor: Sensor, grid, step: float) -> tuple[np.ndarray | None, tuple]:
+    """The grid as knots where a sensor is averaged, or None; and `Alignment.carried` of it.
 
     Averaged is a faster one, where that misses nothing to speak of. What it and the slowest one
     keep of the motion is the same then, and no reading is thrown away.
@@ -205,7 +205,7 @@ def _carried(sensor: Sensor, grid, step: float) -> tuple[np.ndarray | None, Carr
     # any white noise shows what is left of it
     white = np.random.default_rng(0).standard_normal(sensor.values.shape)
     noise = sensor.noise_sd * np.sqrt(np.nanmean(Splines(sensor, white, knots)(grid) ** 2))
-    return knots, Carried(1 / sensor.step, sensor.jitter, sensor.error(spacing), noise)
+    return knots, (1 / sensor.step, sensor.jitter, sensor.error(spacing), noise)
 
 
 def _of_stamps(clocks, gyroscopes, origins) -> tuple[Clock, ...]:

@@ -1,7 +1,6 @@
 """Results of aligning logs: in lines for a person, and as a file keeps them."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -12,29 +11,6 @@ from imuarray.firstorder.turns import TURNED, angle_of
 from imuarray.recording.record import AXES
 
 KINDS = {"accelerometer": ("m/s^2", 1.0), "gyroscope": ("deg/s", 180 / np.pi)}  # as lines show them
-
-
-class Carried(NamedTuple):
-    """One sensor: ``rate`` Hz by the first log's clock, ``jitter`` s of its stamps.
-
-    ``error`` is the rms of what interpolation misses in motion, ``noise_sd`` the declared noise in
-    an interpolated reading, both m/s^2 or rad/s.
-    """
-
-    rate: float
-    jitter: float
-    error: float
-    noise_sd: float
-
-    def line(self, kind: str) -> str:
-        """For a person."""
-        unit, scale = KINDS[kind]
-        off = f", stamps {1e3 * self.jitter:.2g} ms off even readings"
-        off *= self.jitter > SETTINGS.jitter
-        return (
-            f"{kind} at {self.rate:.2f} Hz{off}, interpolation misses"
-            f" {scale * self.error:.2g} {unit} where noise is {scale * self.noise_sd:.2g}"
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +24,9 @@ class Alignment:
     declared : (K,) rad, between the rotation found and the one declared; NaN where none was
     clocks : K of `Clock`, each against the first log's
     agreement : (K,) residual of each gyroscope against the first, over the declared noise of both
-    carried : K pairs of `Carried`, accelerometer and gyroscope
+    carried : (K, 2, 4) of accelerometer and gyroscope
+        Rate, Hz by the first log's clock; jitter of the stamps, s; rms of what interpolation misses
+        in motion, and the declared noise in an interpolated reading, m/s^2 or rad/s.
     step : s, between common instants
     origin : s, the first log's stamp at the recording's instant zero
     count, left_out : common instants, and those that gaps in the logs cost beside
@@ -61,7 +39,7 @@ class Alignment:
     declared: np.ndarray
     clocks: tuple[Clock, ...]
     agreement: np.ndarray
-    carried: tuple[tuple[Carried, Carried], ...]
+    carried: np.ndarray
     step: float
     origin: float
     count: int
@@ -81,7 +59,7 @@ class Alignment:
         out = [f"{self.count} common instants at {rate}{gaps}", *self.ends]
         for k, (label, pair) in enumerate(zip(self.labels, self.carried, strict=True)):
             out += [f"IMU {label}: {self._lies(k)}"] if k else []
-            shown = (one.line(kind) for kind, one in zip(KINDS, pair, strict=True))
+            shown = (_carried(kind, *one) for kind, one in zip(KINDS, pair, strict=True))
             out.append(f"IMU {label}: {'; '.join(shown)}")
         return out
 
@@ -130,6 +108,16 @@ class Alignment:
             {name: np.array(list(labels), object) for name, labels in named.items()},
             {"step": self.step, "origin": origin, "left_out": self.left_out},
         )
+
+
+def _carried(kind: str, rate: float, jitter: float, error: float, noise: float) -> str:
+    """One sensor's numbers of `Alignment.carried` for a person."""
+    unit, scale = KINDS[kind]
+    off = f", stamps {1e3 * jitter:.2g} ms off even readings" if jitter > SETTINGS.jitter else ""
+    return (
+        f"{kind} at {rate:.2f} Hz{off}, interpolation misses"
+        f" {scale * error:.2g} {unit} where noise is {scale * noise:.2g}"
+    )
 
 
 def _with(value: float, sd: float) -> str:

@@ -1,4 +1,4 @@
-"""The work behind `imuarray apply`."""
+"""The work behind `imuarray apply` and `imuarray export`: what one does with a calibration."""
 
 from itertools import chain
 from typing import Any
@@ -6,14 +6,16 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from imuarray.analysis.export import export as exported
 from imuarray.analysis.model import assumed
 from imuarray.analysis.motion import as_calibrated, motion_parts
 from imuarray.commands.output import Answer
 from imuarray.errors import InputError
+from imuarray.firstorder.noise import allan
 from imuarray.motion.state import UNITS
-from imuarray.provenance import trust, write_netcdf_parts
+from imuarray.provenance import trust, write_bytes, write_netcdf_parts
 from imuarray.recording import load_dataset, read_recording
-from imuarray.trust import reasons_of_motion
+from imuarray.trust import reasons_in, reasons_of_motion
 
 COUNTED = "samples", "left_out", "gyroscope_at_rail", "not_converged"
 RAILED = "off_the_rail", "at_the_rail"
@@ -104,3 +106,18 @@ def report(found: dict) -> list[str]:
             f" time - {late:.3g} s (attribute late_s)"
         )
     return lines
+
+
+def export(arguments, _) -> Answer:
+    """A calibration in another tool's format; one that is not to be trusted says so in it."""
+    calibration = load_dataset(arguments.calibration)
+    noise = None if arguments.noise is None else allan(read_recording(arguments.noise))
+    try:
+        text = exported(calibration, arguments.format, noise)
+        reasons = [f"the calibration is not to be trusted: {x}" for x in reasons_in(calibration)]
+    except InputError as error:
+        raise InputError(f"{arguments.calibration}: {error}") from None
+    write_bytes(text.encode(), arguments.out)
+    count = calibration.sizes["accelerometer"]
+    found = {"format": arguments.format, "imus": count}
+    return Answer(f"{arguments.out}: {count} IMUs, {arguments.format}", found, reasons)

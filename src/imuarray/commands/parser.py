@@ -217,7 +217,7 @@ COMMANDS = (
         ),
     ),
     Command(
-        "export", "export.run",
+        "export", "apply.export",
         "A calibration in another tool's format, with sds and the formula that corrects readings.",
         "cal.nc --format kalibr --out imu.yaml", "file to write",
         (
