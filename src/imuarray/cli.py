@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import NoReturn
 
 from imuarray.commands.argument_types import InputFile, InputLog
@@ -79,7 +80,10 @@ def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | No
             (parser or make_parser()).parse_args(argv, arguments)
             _check_output(arguments)
             _read_effects(arguments)
-            reasons = arguments.run(arguments)
+            from imuarray.commands.output import Output
+
+            output = Output(arguments)
+            reasons = output.done(resolve_name(arguments.run)(arguments, output))
     except InputError as error:
         return _fail(error)
     except BrokenPipeError:

@@ -288,9 +288,8 @@ def write_netcdf_parts(
 
 
 def _seal(path: Path) -> None:
-    content = _sha256(path, path.stat().st_size)
-    with open(path, "ab") as handle:
-        handle.write(SEAL + content)
+    with open(path, "r+b") as handle:
+        handle.write(SEAL + hashlib.file_digest(handle, "sha256").digest())
 
 
 SEAL = b"imuarray sha-256"  # before the digest, at a file's end, where HDF5 does not look
@@ -300,12 +299,9 @@ def seal_of(path: str | Path) -> bytes | None:
     """The digest at the end of a sealed file, or None."""
     length = len(SEAL) + hashlib.sha256().digest_size
     with open(path, "rb") as handle:
-        size = handle.seek(0, os.SEEK_END)
-        if size < length:
-            return None
-        handle.seek(size - length)
+        handle.seek(max(handle.seek(0, os.SEEK_END) - length, 0))
         tail = handle.read()
-    return tail[len(SEAL) :] if tail.startswith(SEAL) else None
+    return tail[len(SEAL) :] if tail.startswith(SEAL) and len(tail) == length else None
 
 
 def is_damaged(path: str | Path) -> bool:
@@ -316,14 +312,9 @@ def is_damaged(path: str | Path) -> bool:
     found = seal_of(path)
     if found is None:
         return False
-    return _sha256(path, os.stat(path).st_size - len(SEAL) - len(found)) != found
-
-
-def _sha256(path: str | Path, size: int) -> bytes:
-    """SHA-256 of a file's first ``size`` bytes."""
-    found = hashlib.sha256()
+    content, left = hashlib.sha256(), os.stat(path).st_size - len(SEAL) - len(found)
     with open(path, "rb") as handle:
-        while size and (part := handle.read(min(size, 2**20))):
-            found.update(part)
-            size -= len(part)
-    return found.digest()
+        while left and (part := handle.read(min(left, 2**20))):
+            content.update(part)
+            left -= len(part)
+    return content.digest() != found

@@ -2,9 +2,7 @@
 
 import argparse
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
-from pkgutil import resolve_name
 from typing import Any, NamedTuple, NoReturn
 
 import imuarray
@@ -267,7 +265,7 @@ class Parser(argparse.ArgumentParser):
 def make_parser(
     commands_given: Sequence[Command] = COMMANDS, name: str = "imuarray"
 ) -> argparse.ArgumentParser:
-    """A parser that gives the command's function as ``run``; a wrong line is an InputError."""
+    """A parser that gives the place of the command's function as ``run``; InputError if wrong."""
     parser = Parser(
         prog=name,
         description="Calibrate the geometry of inertial sensor arrays.",
@@ -305,16 +303,4 @@ def _add(commands, name: str, command: Command) -> None:
     )
     for option_name, given in command.options:
         parser.add_argument(option_name, **given)
-    run = partial(_run, f"{command.package}.{command.run}")
-    parser.set_defaults(run=run, folder=command.folder)
-
-
-def _run(place: str, arguments: argparse.Namespace) -> list[str]:
-    """Reasons why the answer of the function at ``place`` is not to be trusted, and it printed.
-
-    Its module is not loaded before.
-    """
-    from imuarray.commands.output import Output
-
-    output = Output(arguments)
-    return output.done(resolve_name(place)(arguments, output))
+    parser.set_defaults(run=f"{command.package}.{command.run}", folder=command.folder)

@@ -223,17 +223,12 @@ def _agree(steps, passed, period) -> np.ndarray:
     return (steps > 0) & (steps < NUMBERS // 2) & (np.abs(off) < allowed)
 
 
-def _most(linked) -> slice:
-    """The most packets in a row that are ``linked`` (N - 1,), each to the next."""
-    return max(pieces(~linked), key=lambda piece: piece.stop - piece.start)
-
-
 def _advancing(number, stamp, period, linked) -> np.ndarray:
     """Indices of the most packets that advance, of those in step with the longest run's middle.
 
     The most, so that a repeated packet before a gap does not cost the sound ones before it.
     """
-    best = _most(linked)
+    best = max(pieces(~linked), key=lambda piece: piece.stop - piece.start)
     anchor = (best.start + best.stop) // 2
     steps = (np.diff(number) + NUMBERS // 2) % NUMBERS - NUMBERS // 2
     place = np.concatenate([[0], np.cumsum(steps)])
@@ -261,7 +256,7 @@ def _increasing(values: list[int]) -> list[int]:
 
 def _joined(number, stamp, period, linked) -> np.ndarray:
     """Indices of the longest run of linked packets, with all that fit before and after it."""
-    best = _most(linked)
+    best = max(pieces(~linked), key=lambda piece: piece.stop - piece.start)
 
     def fits(one, other):
         step, ticks = (number[other] - number[one]) % NUMBERS, (stamp[other] - stamp[one]) % WRAP

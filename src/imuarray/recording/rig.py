@@ -80,13 +80,13 @@ def to_rig(imus: Mapping[str, dict], read: Mapping[str, list[Readings]], layout,
     unknown. Times are from the earliest stamp of all, of an IMU whose clock has another origin
     from its own. InputError for stamps out of order.
     """
-    places, lines, whole = positions(imus, layout, f"{where}: imus"), [], {}
-    for label, kinds in read.items():
-        whole[label] = []
-        for kind, readings in zip(KINDS, kinds, strict=True):
-            kept, said = _in_order(readings)
-            lines += [f"{label}: {kind}: {part}" for part in (*readings.lines, *said)]
-            whole[label].append(kept)
+    places = positions(imus, layout, f"{where}: imus")
+    whole = {label: [_in_order(one) for one in kinds] for label, kinds in read.items()}
+    lines = [
+        f"{label}: {kind}: {line}"
+        for label, kinds in whole.items() for kind, one in zip(KINDS, kinds, strict=True)
+        for line in one.lines
+    ]  # fmt: skip
     first, apart = _origins(list(whole.values()))
     lines += [
         f"{label}: its stamps are at no time those of {next(iter(whole))}: both are taken to begin"
@@ -131,8 +131,8 @@ def _time(readings: Readings, first: Readings) -> np.ndarray:
     return readings.unit * (readings.stamps - origin)
 
 
-def _in_order(readings: Readings) -> tuple[Readings, list[str]]:
-    """Stamps that increase, and what was left out: blank readings, and those logged twice."""
+def _in_order(readings: Readings) -> Readings:
+    """With stamps that increase: without blank readings, and those logged twice."""
     stamps, values, where = readings.stamps, readings.values, readings.where
     there = ~np.isnan(stamps) & ~np.isnan(values).any(axis=1)
     require(there.any(), where, "readings", "none")
@@ -155,8 +155,8 @@ def _in_order(readings: Readings) -> tuple[Readings, list[str]]:
             )
     kept = rows[np.concatenate([[True], ~again])]
     counts = (("no reading", len(stamps) - len(rows)), ("the last one again", again.sum()))
-    lines = [f"{what} in {n} of {len(stamps)}" for what, n in counts if n]
-    return Readings(stamps[kept], readings.unit, values[kept], where), lines
+    lines = (*readings.lines, *(f"{what} in {n} of {len(stamps)}" for what, n in counts if n))
+    return Readings(stamps[kept], readings.unit, values[kept], where, lines)
 
 
 def recording_of(rig: Rig) -> Recording | None:

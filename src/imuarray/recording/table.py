@@ -31,19 +31,18 @@ def recording_of(table: pd.DataFrame, layout, path, columns) -> tuple[Recording,
     section, clock = _clock(layout["time"], name)
     time, rows, lines = _time(table, section, where, name)
     table = table.iloc[rows]
-    force, labels = _sensors(table, layout, "accelerometers", where, name)
-    rate, rate_labels = _sensors(table, layout, "gyroscopes", where, name)
+    force, axes = _sensors(table, layout, "accelerometers", where, name)
+    rate, _ = _sensors(table, layout, "gyroscopes", where, name)
     given = layouts.numbers(layout, name)
     if "output_rate" in layout:
         given["output_period"] = 1 / layouts.positive(layout["output_rate"], f"{name}: output_rate")
     given |= clock
-    triads = layout["accelerometers"]["triads"]
+    triads, others = (layout[kind]["triads"] for kind in layouts.KINDS)
     found = Recording(
         time=time, specific_force=force, angular_rate=rate,
         accelerometer_position=layouts.positions(triads, layout, f"{name}: accelerometers"),
-        accelerometer_labels=labels, gyroscope_labels=rate_labels,
-        accelerometer_axes=np.array([_turn(triad, f"{name}: {x}") for x, triad in triads.items()]),
-        source=Path(path).name, selected=account, **given,
+        accelerometer_labels=tuple(map(str, triads)), gyroscope_labels=tuple(map(str, others)),
+        accelerometer_axes=axes, source=Path(path).name, selected=account, **given,
     )  # fmt: skip
     return found, lines
 
@@ -119,21 +118,18 @@ def column(table, name, where, blank: bool = False) -> np.ndarray:
 
 
 def _sensors(table, layout, kind, where, layout_name):
-    """Readings (T, K, 3) in SI units in the array frame, and the labels."""
+    """Readings (T, K, 3) in SI units in the array frame, and the turns (K, 3, 3) to it."""
     section = layout[kind]
-    unit, parts = layouts.unit_of(section, kind, layout_name), []
+    unit, parts, turns = layouts.unit_of(section, kind, layout_name), [], []
     for label, triad in section["triads"].items():
         place = f"{layout_name}: {kind} {label!r}"
         names = layouts.three_columns(triad["columns"], place)
         own = np.stack([column(table, name, where).astype(float) for name in names], axis=1)
+        turns.append(layouts.rotation(triad.get("axes", list("xyz")), place))
         # what is infinite is refused where readings are checked
         with np.errstate(over="ignore", invalid="ignore"):
-            parts.append(unit * own @ _turn(triad, place).T)
-    return np.stack(parts, axis=1), tuple(str(label) for label in section["triads"])
-
-
-def _turn(triad, where: str) -> np.ndarray:
-    return layouts.rotation(triad.get("axes", list("xyz")), where)
+            parts.append(unit * own @ turns[-1].T)
+    return np.stack(parts, axis=1), np.array(turns)
 
 
 def stamps_of(table, section, where, layout_name, blank: bool = False) -> tuple[np.ndarray, float]:

@@ -88,9 +88,9 @@ def check_values(recording: Recording, where: str) -> None:
     if not recording.gyroscope_labels:
         raise IdentifiabilityError(f"{where}: expected at least 1 gyroscope triad, found 0")
     for kind in record.KINDS:
-        require_count(len(getattr(recording, f"{kind}_labels")), where, kind)
-    for kind in record.KINDS:
-        for label, times in Counter(getattr(recording, f"{kind}_labels")).items():
+        labels = getattr(recording, f"{kind}_labels")
+        require_count(len(labels), where, kind)
+        for label, times in Counter(labels).items():
             found = f"{label!r} {times} times"
             require(times == 1, f"{where}: {kind}", "labels that are all different", found)
     limits = {name: getattr(recording, f"{kind}_range") for kind, name in record.KINDS.items()}
