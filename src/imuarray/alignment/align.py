@@ -13,7 +13,7 @@ from imuarray.alignment.clocks import Clock, compare
 from imuarray.alignment.found import KINDS, Alignment
 from imuarray.alignment.resample import Sensor, Splines
 from imuarray.alignment.settings import SETTINGS
-from imuarray.errors import InputError, require
+from imuarray.errors import require
 from imuarray.firstorder.rails import rails_shown
 from imuarray.firstorder.turns import angle_of
 from imuarray.recording import Recording, record
@@ -233,14 +233,12 @@ def _require_slow(sensors: Sequence[Sensor]) -> None:
         require(run >= SETTINGS.unbroken, sensor.name, expected, f"{run} at most")
     worst = max(sensors, key=lambda sensor: sensor.error(sensor.step) / sensor.noise_sd)
     missed = worst.error(worst.step)
-    if missed > worst.noise_sd:
-        unit, scale = KINDS[worst.name.split()[0]]
-        raise InputError(
-            f"{worst.name}: expected readings that interpolation carries over within their noise of"
-            f" {scale * worst.noise_sd:.2g} {unit}, found motion too fast for {1 / worst.step:.4g}"
-            f" Hz: it misses {scale * missed:.2g}; log at a higher rate, move more slowly, or"
-            " declare the noise as it is"
-        )
+    unit, scale = KINDS[worst.name.split()[0]]
+    noise = f"their noise of {scale * worst.noise_sd:.2g} {unit}"
+    found = f"motion too fast for {1 / worst.step:.4g} Hz: it misses {scale * missed:.2g}"
+    hint = "log at a higher rate, move more slowly, or declare the noise as it is"
+    expected = f"readings that interpolation carries over within {noise}"
+    require(not missed > worst.noise_sd, worst.name, expected, f"{found}; {hint}")
 
 
 def _recording(logs, rotation, grid, sensors, knots) -> tuple[Recording, np.ndarray]:

@@ -70,12 +70,10 @@ def compare(first: Sensor, other: Sensor, ahead: float = 0.0) -> Clock:
     turn = procrustes(other.values[used], base[used])
     _require_turning(base[used], turn, other.name)
     found = _fit(splines, other, clock._replace(map=turn), used)
-    if found.stray > SETTINGS.wild * max(first.step, other.step):
-        raise InputError(
-            f"{other.name}: expected stamps that tell when it was read, found rates as far from the"
-            f" first's as if stamps were {1e3 * found.stray:.2g} ms wrong; let the sensor or its"
-            " driver stamp the readings"
-        )
+    wild = found.stray > SETTINGS.wild * max(first.step, other.step)
+    far = f"rates as far from the first's as if stamps were {1e3 * found.stray:.2g} ms wrong"
+    hint = "let the sensor or its driver stamp the readings"
+    require(not wild, other.name, "stamps that tell when it was read", f"{far}; {hint}")
     return found
 
 

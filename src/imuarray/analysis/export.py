@@ -62,8 +62,8 @@ def describe(calibration: xr.Dataset, noise: StillNoise | None = None) -> dict[s
     """The document: plain data, None for what is not known; units in the keys or beside them."""
     require_fit(calibration)
     labels = {kind: [str(label) for label in calibration[kind].to_numpy()] for kind in KINDS}
-    if len(labels["gyroscope"]) > len(labels["accelerometer"]):
-        raise InputError("export: expected no more gyroscopes than accelerometers, found more")
+    few = len(labels["gyroscope"]) <= len(labels["accelerometer"])
+    require(few, "export", "no more gyroscopes than accelerometers", "more")
     attrs, positions = calibration.attrs, calibration["position"].to_numpy()
     effects = effect_names(calibration)
     array = Array(positions, tuple(labels["accelerometer"]), len(labels["gyroscope"]), "export")

@@ -85,12 +85,10 @@ def _require_paired(recording: Recording) -> None:
     """InputError where a gyroscope stands at the place of another IMU's accelerometer."""
     labels = recording.accelerometer_labels
     for place, label in enumerate(recording.gyroscope_labels):
-        if label in labels and labels.index(label) != place:
-            raise InputError(
-                f"gyroscopes: expected them in the accelerometers' order, IMUs without one last,"
-                f" found {label!r} as number {place + 1}, whose accelerometer is number"
-                f" {labels.index(label) + 1}"
-            )
+        own = labels.index(label) if label in labels else place
+        expected = "them in the accelerometers' order, IMUs without one last"
+        found = f"{label!r} as number {place + 1}, whose accelerometer is number {own + 1}"
+        require(own == place, "gyroscopes", expected, found)
 
 
 def _opened(paths, columns, topics) -> Opened:
@@ -201,20 +199,20 @@ def _railed(found: Any) -> tuple[Any, list[str]]:
     And lines that say so. A recording's triads have each a rail of their own.
     """
     changed: dict[str, Any] = {}
-    lines = []
+    lines, board = [], isinstance(found, Recording)
     for kind, name in KINDS.items():
         limit, values = getattr(found, f"{kind}_range"), getattr(found, name)
         rails = _rails(values.reshape(len(values), -1, 3), limit)
         if (rails == limit).all():
             continue
         changed[f"{kind}_range"] = rails.max()
-        if isinstance(found, Recording):
+        labels = np.array(getattr(found, f"{kind}_labels") if board else [found.label])
+        if board:
             known = getattr(found, f"saturated_{kind}s")()
             changed[f"{name}_saturated"] = known | (np.abs(values) >= RAIL * rails[:, None])
         for rail in np.unique(rails[rails < limit]):
-            whose = f"{found.label}: {kind}" if isinstance(found, Log) else f"{kind} " + ", ".join(
-                np.array(getattr(found, f"{kind}_labels"))[rails == rail]
-            )  # fmt: skip
+            alike = ", ".join(labels[rails == rail])
+            whose = f"{kind} {alike}" if board else f"{alike}: {kind}"
             unit = "m/s^2" if kind == "accelerometer" else f"rad/s ({np.degrees(rail):.4g} deg/s)"
             lines.append(
                 f"{whose}: clipped at {rail:.4g} {unit}, within its declared range of {limit:.4g}:"

@@ -75,7 +75,7 @@ def has_truth(path: str | Path) -> bool:
 
 
 def _has_group(path: str | Path, name: str) -> bool:
-    with _hdf5(_existing(path)) as file:
+    with _hdf5(path) as file:
         return isinstance(file.get(name), h5py.Group)
 
 
@@ -106,15 +106,11 @@ def write_recording(
     )  # fmt: skip
 
 
-def _existing(path: str | Path) -> Path:
+def _hdf5(path: str | Path) -> h5py.File:
+    """Open the file as HDF5, on which NetCDF-4 rests; InputError where there is none."""
     path = Path(path)
     found = "a folder there" if path.is_dir() else "nothing there"
     require(path.is_file(), str(path), "a recording (a NetCDF-4 file)", found)
-    return path
-
-
-def _hdf5(path: Path) -> h5py.File:
-    """Open the file as HDF5, on which NetCDF-4 rests."""
     try:
         return h5py.File(path, "r")
     except OSError as error:
@@ -127,9 +123,9 @@ def load_dataset(path: str | Path, group: str | None = None, stored: bool = Fals
     Not before the sizes that it declares have been looked at. With ``stored`` the variables of a
     long one are read when they are asked for.
     """
-    path = _existing(path)
+    path = Path(path)
     with expecting(path, "a readable NetCDF-4 file"):
-        whole = not is_damaged(path)
+        whole = not (path.is_file() and is_damaged(path))
         require(whole, str(path), "a file as it was written", "it damaged")
         with _hdf5(path) as file:
             validate.check_sizes(file, str(path), not stored)

@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 import xarray as xr
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 from imuarray.geometry import Array
 from imuarray.recording import units
 
@@ -113,12 +113,9 @@ class Stored:
 
     def _read(self, start: int, stop: int) -> np.ndarray:
         shape = (stop - start, *self.shape[1:])
-        if math.prod(shape) > MAX_VALUES:
-            where = self.variable.encoding.get("source", "recording")
-            raise InputError(
-                f"{where}: expected at most {MAX_VALUES} values to hold in memory, found shape"
-                f" {shape}"
-            )
+        where = self.variable.encoding.get("source", "recording")
+        expected = f"at most {MAX_VALUES} values to hold in memory"
+        require(math.prod(shape) <= MAX_VALUES, where, expected, f"shape {shape}")
         if self.index is None:
             return self._stretch(start, stop)
         index = self.index[start:stop]
