@@ -25,6 +25,11 @@ class Settings:
     spike_near: float = 12.0  # times what these depart from their neighbours
     burst_near: int = 12  # readings of one log; longer bursts may be knocks
     large: float = 0.5  # of the largest reading, from which an abrupt end is a rail and no rest
+    slope_window: int = 7  # samples of the polynomial that gives the rates' derivative
+    slope_order: int = 3  # its degree
+    rough_fast: float = 0.5  # of the rates' rms: slower samples say little of positions
+    rough_sd: float = 0.05  # of the board's size, left by gyroscopes and axes as bought
+    rough_sure: float = 0.1  # of the board's size, beyond which the motion says too little
     # `noise`
     few: int = 50  # samples, up to which several searches for the mode are made
     starts: int = 8  # of them

@@ -37,12 +37,6 @@ class Settings:
     shared_stamps: float = 0.5  # of the rows share their stamps: one row for each sensor, perhaps
     clock_sd: float = 1e-3  # of a rate that is declared: oscillators of chips are off by up to 1 %
     long_log: int = 400  # rows, in which missed readings are bridged; else a table is damaged
-    # `undrawn`
-    slope_window: int = 7  # samples of the polynomial that gives the rates' derivative
-    slope_order: int = 3  # its degree
-    fast: float = 0.5  # of the rates' root mean square: slower samples say little of positions
-    rough_sd: float = 0.05  # of the board's size, left by gyroscopes and axes as bought
-    rough_sure: float = 0.1  # of the board's size, beyond which the motion says too little
     # `units`
     slowest: float = 2.0  # Hz, of an IMU that is to show a motion of the hand
     fastest: float = 5e4  # Hz
