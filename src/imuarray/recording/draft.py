@@ -150,16 +150,14 @@ def by_place(table: pd.DataFrame) -> list[Triad]:
     values = table.apply(pd.to_numeric, errors="coerce").dropna(axis="columns", how="all")
     own = [name for name, x in values.items() if (x.diff() > 0).mean() < SETTINGS.draft_rises]
     require(len(own) % 3 == 0, "columns", "three of each sensor beside the stamps", len(own))
-    found: dict[str, list] = {kind: [] for kind in KINDS}
+    found: list[Triad] = []
     for place in range(0, len(own), 3):
         three = tuple(own[place : place + 3])
         readings = values[list(three)].to_numpy(float)[:, None]
         still = readings[_quietest(readings, len(table) / 100)]
-        found[[*KINDS][_force(still)[0] == UNKNOWN]].append(three)
-    return [
-        Triad(kind, str(number + 1), three)
-        for kind, own in found.items() for number, three in enumerate(own)
-    ]  # fmt: skip
+        kind = [*KINDS][_force(still)[0] == UNKNOWN]
+        found.append(Triad(kind, str(1 + sum(one.kind == kind for one in found)), three))
+    return found
 
 
 def triads_of(names: list[str], units: dict[str, str] | None = None) -> list[Triad]:
