@@ -20,7 +20,7 @@ from imuarray.analysis.board import board
 from imuarray.analysis.motion import _late, as_calibrated
 from imuarray.cli import main
 from imuarray.commands.board import lines_on
-from imuarray.commands.calibrate import position_lines
+from imuarray.commands.positions import position_lines
 from imuarray.engine.estimate import Recorded, estimate
 from imuarray.engine.forward import EFFECT_GROUPS, GYROSCOPES, gains
 from imuarray.engine.parameters import POSITION, columns_of

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from imuarray.analysis.board import board as answered
-from imuarray.commands.calibrate import document, position_lines
 from imuarray.commands.output import Answer, Output
+from imuarray.commands.positions import document, position_lines
 from imuarray.report import board as said
 from imuarray.report.board import Board, write_board
 

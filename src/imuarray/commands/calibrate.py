@@ -6,12 +6,12 @@ import xarray as xr
 from imuarray.analysis.calibration import calibrate as calibrated
 from imuarray.analysis.model import assumed
 from imuarray.commands.output import Answer, Output
+from imuarray.commands.positions import document, position_lines
 from imuarray.engine.directions import position_sds, weakest_of
 from imuarray.model.effects import KINDS
 from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording
 from imuarray.trust import of_file, parameters_of, reasons_of_calibration, reasons_of_poses
-from imuarray.words import number
 
 MISFIT = 1.5  # residual over declared noise from which it is spoken of
 
@@ -35,26 +35,6 @@ def written(dataset: xr.Dataset, recordings, arguments) -> Answer:
     return Answer(report(dataset), document(dataset), reasons)
 
 
-def document(dataset: xr.Dataset) -> dict:
-    """A calibration's main numbers."""
-    labels = [str(label) for label in dataset["accelerometer"].to_numpy()]
-    found = {
-        "converged": bool(dataset.attrs["converged"]),
-        "iterations": dataset.sizes["iteration"],
-        "samples": dataset.attrs["samples"],
-        "residual_ratio": dataset.attrs["residual_ratio"],
-        "accelerometers": labels,
-        "position_m": dataset["position"].to_numpy(),
-        "position_sd_m": position_sds(dataset),
-        "weakest_directions": [
-            {"direction": item.words, "sd_m": item.sd} for item in weakest_of(dataset)
-        ],
-    }
-    if "effect_parameter" in dataset:
-        found["effects"] = parameters_of(dataset)
-    return found
-
-
 def report(dataset: xr.Dataset) -> str:
     """Lines on a calibration for a person."""
     state = "converged" if dataset.attrs["converged"] else "NOT converged"
@@ -65,18 +45,6 @@ def report(dataset: xr.Dataset) -> str:
         lines.append("effect parameter: value (sd)")
     lines += [f"{name}: {at['value']:.4g} ({at['sd']:.2g})" for name, at in parameters.items()]
     return "\n".join([*lines, *_informative(dataset), *_misfit(dataset)])
-
-
-def position_lines(dataset: xr.Dataset) -> list[str]:
-    """A line for each triad under a head."""
-    sds = position_sds(dataset)
-    unit, factor = ("um", 1e6) if sds.max() < 1e-3 else ("mm", 1e3)
-    lines = [f"triad   x mm      y mm      z mm    (sd {unit})"]
-    rows = dataset["accelerometer"].to_numpy(), dataset["position"].to_numpy(), sds
-    for label, row, sd in zip(*rows, strict=True):
-        values = "  ".join(f"{1e3 * value:8.4f}" for value in row)
-        lines.append(f"{label:>5} {values}    {', '.join(number(factor * x, 2) for x in sd)}")
-    return lines
 
 
 def _informative(dataset: xr.Dataset) -> list[str]:
