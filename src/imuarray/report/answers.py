@@ -159,7 +159,11 @@ def some(checks, most=8) -> str:
 def extended(diagnosis: Diagnosis) -> Answer:
     """The extended model: its effects, parameters and noise."""
     document = diagnosis.document
-    noise = noise_in_words(diagnosis)
+    parts = []
+    for (kind, unit), rows in noise_table(diagnosis).groupby(["kind", "unit"], sort=False):
+        size, declared = (span(sd.min(), sd.max(), unit) for sd in (rows.sd, rows.declared))
+        parts.append(f"{kind}s {size}, declared {declared}")
+    noise = f"noise sd of the triads, as the residual shows it: {'; '.join(parts)}"
     if not document["causes"]:
         lead = f"It is the plain model as it stands, {PAPERS}."
         return Answer(lead, [noise])
@@ -175,15 +179,6 @@ def extended(diagnosis: Diagnosis) -> Answer:
         " triad:"
     )
     return Answer(lead, [*items, noise])
-
-
-def noise_in_words(diagnosis: Diagnosis) -> str:
-    """The extended model's noise, by kind, beside the declared one."""
-    parts = []
-    for (kind, unit), rows in noise_table(diagnosis).groupby(["kind", "unit"], sort=False):
-        size, declared = (span(sd.min(), sd.max(), unit) for sd in (rows.sd, rows.declared))
-        parts.append(f"{kind}s {size}, declared {declared}")
-    return f"noise sd of the triads, as the residual shows it: {'; '.join(parts)}"
 
 
 def gained(diagnosis: Diagnosis) -> Answer:

@@ -250,29 +250,22 @@ def shift_panels(signal: Signal) -> Iterator[pd.DataFrame]:
     """A triad that moved: its position in blocks of time, from the residual without the step."""
     made, imu = signal.made, signal.imus[0]
     chosen = made.columns.of(POSITION)
-    blocks = blocks_of(len(made.residual), BLOCKS)
-    found = [position_of_block(signal, imu, chosen, block) for block in blocks]
-    for axis in range(3):
-        frame = pd.DataFrame(
-            [(t, *(value[axis] for value in values)) for t, *values in found],
-            columns=["x", "y", "se", "model"],
+    every, found = made.projected(chosen)[:, imu], []
+    for part in blocks_of(len(made.residual), BLOCKS):
+        own = made.whitened[part, imu][..., chosen].reshape(-1, 3)
+        projected = every[part].reshape(-1, 3)
+        inverse = scaled_inverse(own.T @ own - projected.T @ projected)
+        seen, step = (
+            inverse @ (own.T @ np.nan_to_num(values[part, imu]).ravel())
+            for values in (signal.total, signal.explained)
         )
+        time = np.full(3, made.readings.time[part].mean())
+        found.append([time, seen, np.sqrt(np.diag(inverse)), step])
+    for rows, axis in zip(np.moveaxis(found, -1, 0), AXES, strict=True):
+        frame = pd.DataFrame(rows, columns=["x", "y", "se", "model"])
         frame = frame[frame.se < VAGUE * frame.se.min()]
-        title = f"IMU {made.readings.labels[imu]}, position {AXES[axis]}"
+        title = f"IMU {made.readings.labels[imu]}, position {axis}"
         yield panel(frame, title, "time (s)", "from the mean", LENGTH, least=1.0)
-
-
-def position_of_block(signal: Signal, imu, chosen, part):
-    """(mean time, offset (3,) m, its sd, the same of the step alone) over some samples."""
-    made = signal.made
-    own = made.whitened[part, imu][..., chosen].reshape(-1, 3)
-    projected = made.projected(chosen)[part, imu].reshape(-1, 3)
-    inverse = scaled_inverse(own.T @ own - projected.T @ projected)
-    seen, step = (
-        inverse @ (own.T @ np.nan_to_num(values[part, imu]).ravel())
-        for values in (signal.total, signal.explained)
-    )
-    return float(made.readings.time[part].mean()), seen, np.sqrt(np.diag(inverse)), step
 
 
 AGAINST = {  # by what an effect is drawn against: its panels, and what they show
