@@ -9,7 +9,7 @@ from imuarray.analysis.sensors import used
 from imuarray.engine.clocks import CLOCK, refined, shown_clocks, timed, with_clocks
 from imuarray.engine.estimate import Estimate, Recorded, estimate
 from imuarray.engine.linearise import State
-from imuarray.engine.parameters import Columns, columns_of, model_of
+from imuarray.engine.parameters import columns_of, model_of
 from imuarray.engine.readings import Readings, measured
 from imuarray.engine.rough_fusion import Rough, roughly
 from imuarray.engine.settings import SETTINGS
@@ -41,16 +41,11 @@ def with_board(recording: Recording, calibration: xr.Dataset) -> tuple[Readings,
     imus = sorted(clocks)
     one = with_clocks(one, columns, clocks)
     one = timed(refined(one, keep, columns, imus), keep, columns, imus)
-    return readings, _finished(one, columns, effects, fitted, imus)
-
-
-def _finished(one: Recorded, columns: Columns, effects, own, imus) -> Estimate:
-    """All ``own`` effects and the clocks of some IMUs, no more than ``effects`` in the model."""
     found = columns.model.split(one.state.parameters)
-    columns = columns_of(one.readings.array, effects, one.readings.position_prior_sd)
-    values = columns.model.join({name: found[name] for name in effects})
-    one = replace(one, state=one.state._replace(parameters=values))
-    return estimate([one], columns, columns.mask(own) | columns.mask([CLOCK], imus))
+    columns = columns_of(readings.array, effects, readings.position_prior_sd)
+    joined = columns.model.join({name: found[name] for name in effects})
+    one = replace(one, state=one.state._replace(parameters=joined))
+    return readings, estimate([one], columns, columns.mask(fitted) | columns.mask([CLOCK], imus))
 
 
 def fused(recording: Recording, calibration: xr.Dataset, chosen) -> Rough:

@@ -26,7 +26,7 @@ from imuarray.estimation.collapsed import Collapsed
 from imuarray.geometry import positions_of
 from imuarray.linear import scaled_inverse
 from imuarray.model import ArrayModel
-from imuarray.model.effects import EFFECTS, KINDS
+from imuarray.model.effects import KINDS
 from imuarray.posterior.generic import SCALES, log_laplace, unknown
 from imuarray.posterior.marginal import Marginal, log_posterior
 from imuarray.posterior.prior import GaussianPrior, TiedPrior
@@ -50,11 +50,6 @@ class Posterior(NamedTuple):
     readings: Readings | None = None  # with effects: what is sampled from, with its noise
     converged: bool = True  # with effects: whether the search for the mode did
     size_sd: float = 0.0  # of the logarithm of a factor that the density leaves out
-
-    @property
-    def spread(self) -> np.ndarray:
-        """(5, K) from the unknown logs to those of `SCALES`."""
-        return np.eye(len(SCALES))[:, [SCALES.index(name) for name in self.scales]]
 
 
 def posterior_of(recording: Recording, known: bool = False, notify: Notify = silent) -> Posterior:
@@ -84,12 +79,14 @@ def posterior_of(recording: Recording, known: bool = False, notify: Notify = sil
     )  # fmt: skip
 
 
-def posterior_beyond(recording: Recording, found: Estimate) -> Posterior:
+def posterior_beyond(recording: Recording, found: Estimate, notify: Notify = silent) -> Posterior:
     """The posterior under a model with effects, around where the engine has fitted it.
 
     Readings, their noise, and what is known of gauges are the estimate's; noise and the size of
     omega, omega_dot and s are unknown as in `posterior_of`.
     """
+    if not found.converged:
+        notify(NOT_CONVERGED)
     one, mine = found.recorded[0], found.places[0]
     place = places_among(found, effects_of(found))[0][mine]
     precision = priors_of(found)[np.ix_(mine, mine)]
@@ -116,13 +113,6 @@ def posterior_beyond(recording: Recording, found: Estimate) -> Posterior:
         block_diag(spread, np.diag(0.5 / np.maximum(freedom, 1.0))), SCALES, motion, readings,
         found.converged,
     )  # fmt: skip
-
-
-def common_sd(recording: Recording, model: ArrayModel) -> float:
-    """Relative sd of a scale common to all rates and to time that a model has no parameter for."""
-    has = any(EFFECTS[e].resizes and EFFECTS[e].kinds == [1] for e in model.effects)
-    own = 0.0 if has else recording.gyroscope_common_scale_sd
-    return float(np.hypot(*np.nan_to_num([own, recording.clock_sd])))
 
 
 def _model(recording: Recording, found: Estimate, readings: Readings, sizes) -> ArrayModel:
@@ -188,9 +178,11 @@ def log_extended(model: ArrayModel) -> Callable:
 def traced(posterior: Posterior, notify: Notify = silent):
     """(log density, data): a function of theta (P,) and of arrays, to be compiled by JAX."""
     prior = posterior.prior
+    # (5, K) from the unknown logs to those of `SCALES`
+    spread = np.eye(len(SCALES))[:, [SCALES.index(name) for name in posterior.scales]]
     if isinstance(prior, TiedPrior):
         assert posterior.readings is not None  # there are, with effects
-        given = unknown(posterior.readings, posterior.motion, posterior.spread)
+        given = unknown(posterior.readings, posterior.motion, spread)
         return log_extended(posterior.model), (given, prior.mean, prior.root)
     recording = posterior.recording
     saturated = recording.saturated_gyroscopes()
@@ -209,5 +201,5 @@ def traced(posterior: Posterior, notify: Notify = silent):
         notify("gyroscopes that see little of the motion: the likelihood is good to"
             f" {found.gap:.1g} nats only")  # fmt: skip
     return log_posterior, (
-        found.data, found.nodes, found.log_weights, posterior.spread, prior.mean, prior.sd
+        found.data, found.nodes, found.log_weights, spread, prior.mean, prior.sd
     )  # fmt: skip

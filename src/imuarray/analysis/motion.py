@@ -17,13 +17,13 @@ from imuarray.firstorder.correct import corrected
 from imuarray.firstorder.rails import less_leak, nearest_rail, rails_shown
 from imuarray.model import ArrayModel
 from imuarray.model.array_model import parameter_names
-from imuarray.model.effects import KINDS, find_effects
+from imuarray.model.effects import find_effects
 from imuarray.model.noise import Noise
 from imuarray.motion import Motion
 from imuarray.motion.state import UNITS
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
-from imuarray.recording.record import CORRECTION
+from imuarray.recording.record import CORRECTION, KINDS, MATRICES
 from imuarray.trust import effect_names, require_fit, require_labels, values_of
 
 
@@ -85,8 +85,10 @@ def as_calibrated(recording: Recording, calibration: xr.Dataset) -> Recording:
     require_fit(calibration)
     require_labels(calibration, recording)
     first, recording = calibration[list(CORRECTION)].isel(recording=0), recording.in_memory()
-    changed: dict[str, Any] = {}
-    for kind, name in zip(KINDS, ("specific_force", "angular_rate"), strict=True):
+    changed: dict[str, Any] = {
+        name: calibration[name].to_numpy() if name in calibration else None for name in MATRICES
+    }
+    for kind, name in KINDS.items():
         inverse, offset = (first[f"{kind}_{part}"].to_numpy() for part in ("inverse", "offset"))
         railed = getattr(recording, f"saturated_{kind}s")()
         limit = getattr(recording, f"{kind}_range")
@@ -95,12 +97,8 @@ def as_calibrated(recording: Recording, calibration: xr.Dataset) -> Recording:
             f"{name}_saturated": rails_shown(inverse, railed),
             f"{kind}_range": nearest_rail(limit, np.linalg.inv(inverse), offset),
         }
-    axes, maps = calibration.get("accelerometer_axes"), calibration.get("map_covariance")
-    return replace(
-        recording, correction=first, accelerometer_position=calibration["nominal_position"].values,
-        accelerometer_axes=None if axes is None else axes.to_numpy(),
-        map_covariance=None if maps is None else maps.to_numpy(), **changed,
-    )  # fmt: skip
+    places = calibration["nominal_position"].to_numpy()
+    return replace(recording, correction=first, accelerometer_position=places, **changed)
 
 
 def _motion_of(calibration, recording: Recording, accelerometer_noise, origin) -> xr.Dataset:

@@ -34,11 +34,9 @@ def read_mimu(
     """
     from imuarray.recording.mimu_recording import read_board
 
-    return read_board(
-        Path(path), Path(positions), underside, accelerometer_noise_sd=accelerometer_noise,
-        gyroscope_noise_sd=gyroscope_noise, position_prior_sd=position_prior,
-        output_rate=output_rate,
-    )[0]  # fmt: skip
+    noise = accelerometer_noise, gyroscope_noise
+    files = Path(path), Path(positions)
+    return read_board(*files, underside, *noise, position_prior, output_rate)[0]
 
 
 def read_calibration(path: str | PathLike) -> xr.Dataset:

@@ -10,22 +10,14 @@ import pandas as pd
 import xarray as xr
 
 from imuarray.analysis import methods
-from imuarray.analysis.density import (
-    NOT_CONVERGED,
-    Posterior,
-    common_sd,
-    posterior_beyond,
-    posterior_of,
-    traced,
-)
+from imuarray.analysis.density import Posterior, posterior_beyond, posterior_of, traced
 from imuarray.analysis.model import Notify, assumed, require_together, silent, usable
 from imuarray.analysis.sensors import fitted
 from imuarray.analysis.settings import SETTINGS
 from imuarray.engine.dataset import effects_of
 from imuarray.errors import require_integer, require_one_of
-from imuarray.model import ArrayModel
 from imuarray.model.array_model import parameter_names
-from imuarray.model.effects import KINDS
+from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.posterior.chains import Chains, chain_tree, chains_of
 from imuarray.posterior.diagnostics import ess, rhat, summarise
 from imuarray.posterior.generic import SCALES
@@ -96,14 +88,16 @@ def sample(
     if model != "papers":
         found, _ = fitted([recording], str(model), effects, notify, plain=False)
         if found is not None and effects_of(found):
-            if not found.converged:
-                notify(NOT_CONVERGED)
-            posterior = posterior_beyond(recording, found)
+            posterior = posterior_beyond(recording, found, notify)
     if posterior is None:
         moving, known = assumed(moving, accelerometer_noise), accelerometer_noise is not None
         posterior = posterior_of(moving, known, notify)
     if model != "papers":
-        posterior = posterior._replace(size_sd=2.0 * common_sd(moving, posterior.model))
+        # a scale common to all rates and to time, where the model has no parameter for it
+        scaled = [EFFECTS[name] for name in posterior.model.effects if EFFECTS[name].resizes]
+        own = any(effect.kinds == [1] for effect in scaled)
+        sds = [0.0 if own else moving.gyroscope_common_scale_sd, moving.clock_sd]
+        posterior = posterior._replace(size_sd=2.0 * float(np.hypot(*np.nan_to_num(sds))))
     return _exact(posterior, method, steps, seed, not progress, notify)
 
 
@@ -118,7 +112,10 @@ def _exact(
         chains, k = run_independent(
             log_density, mode, posterior.covariance, steps, seed, names, quiet, data
         )
-        short = _short(chains, k, steps)
+        worst, least = rhat(chains.draws).max(), ess(chains.draws).min()
+        few = steps is None and (worst > POSTERIOR.rhat or least < POSTERIOR.effective)
+        short = f"independent proposals: Pareto's k {k:.2f}, R-hat {worst:.3f}, ESS {least:.0f}"
+        short = short if few or not k <= POSTERIOR.unreliable else ""  # NaN is not enough, too
         if method == "independent" or not short or not posterior.converged:  # NUTS would take hours
             attrs, key = {"sampler": "independent"}, _key(posterior, steps, seed, method)
             return tree_of(posterior, chains, attrs | {"pareto_k": k}, key, seed, bool(short))
@@ -133,15 +130,6 @@ def _exact(
         data=data,
     )  # fmt: skip
     return tree_of(posterior, chains, attrs, _key(posterior, steps, seed, method), seed)
-
-
-def _short(chains: Chains, k: float, steps: int | None) -> str:
-    """Why independent proposals are not enough; empty where they are."""
-    worst, least = rhat(chains.draws).max(), ess(chains.draws).min()
-    few = steps is None and (worst > POSTERIOR.rhat or least < POSTERIOR.effective)
-    if k <= POSTERIOR.unreliable and not few:
-        return ""
-    return f"independent proposals: Pareto's k {k:.2f}, R-hat {worst:.3f}, ESS {least:.0f}"
 
 
 def _key(posterior: Posterior, steps: int | None, seed: int, method: str) -> str:
@@ -175,8 +163,10 @@ def tree_of(
     kept = "burn_in_draws", "burn_in_steps", "steps", "rhat_max", "ess_min"
     attrs |= {name: verdict[name] for name in kept} | more
     sound = verdict["converged"] and verdict["ess_min"] >= SETTINGS.few_effective and not short
-    attrs |= {"converged": int(sound), "divergent": chains.divergent, **_noise(model)}
-    unit = dict(zip(SCALES, [*_noise(model).values(), *model.motion_sd], strict=True))
+    rms = {kind: float(np.diag(getattr(model.noise, kind)).mean() ** 0.5) for kind in KINDS}
+    attrs |= {"converged": int(sound), "divergent": chains.divergent}
+    attrs |= {f"{kind}_noise_sd": sd for kind, sd in rms.items()}
+    unit = dict(zip(SCALES, [*rms.values(), *model.motion_sd], strict=True))
     sds = {name: unit[name] for name in posterior.scales}
     return chain_tree(chains, labels, posterior.prior, attrs, names, sds)
 
@@ -194,12 +184,6 @@ def resized(chains: Chains, size: int, sd: float, seed: int) -> Chains:
     draws = chains.draws.copy()
     draws[..., :size] *= factor[..., None]
     return replace(chains, draws=draws)
-
-
-def _noise(model: ArrayModel) -> dict[str, float]:
-    """Rms noise over the triads of each kind (m/s^2, rad/s)."""
-    variances = {kind: np.diag(getattr(model.noise, kind)).mean() for kind in KINDS}
-    return {f"{kind}_noise_sd": float(value**0.5) for kind, value in variances.items()}
 
 
 def summary(posterior: xr.DataTree) -> pd.DataFrame:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from imuarray.errors import InputError
+from imuarray.errors import require
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model.structure import design, products
 from imuarray.recording import Recording
@@ -39,11 +39,8 @@ def disjoint(left: np.ndarray, counts) -> dict[int, np.ndarray]:
 
     InputError where there are too few.
     """
-    if len(left) < sum(counts):
-        raise InputError(
-            f"recording: expected at least {sum(counts)} informative samples, found {len(left)}"
-        )
-    chosen = {}
+    wanted, chosen = f"at least {sum(counts)} informative samples", {}
+    require(len(left) >= sum(counts), "recording", wanted, len(left))
     for count in sorted(counts, reverse=True):
         picks = np.linspace(0, len(left) - 1, count).round().astype(int)
         chosen[count] = left[picks]
@@ -92,11 +89,9 @@ def select_dynamic(recording: Recording) -> Selection:
         left &= ~bad
     usable = np.flatnonzero(left)
     if not len(usable):
-        raise InputError(
-            "recording: expected moving samples off the rails, found none ("
-            + ", ".join(f"{count} {words}" for words, count in removed.items()) + ")"
-            + _shaken(recording, still, speed)
-        )  # fmt: skip
+        each = ", ".join(f"{count} {words}" for words, count in removed.items())
+        found = f"none ({each}){_shaken(recording, still, speed)}"
+        require(False, "recording", "moving samples off the rails", found)
     size = information(recording.select(usable))
     keep = size >= np.quantile(size, 1 - INFORMATIVE)
     removed["less informative half"] = int((~keep).sum())

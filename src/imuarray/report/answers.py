@@ -1,5 +1,6 @@
 """The four answers of a diagnosis in plain words, from its document."""
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -61,21 +62,17 @@ def verdict(diagnosis: Diagnosis) -> str:
     )
     if document["unexplained"]:
         parts.append(
-            "Smooth samples are explained; what is left is motion faster than the samples."
-            if _shaken(document)
-            else "Unexplained: something is left that no known cause explains."
+            "Unexplained: something is left that no known cause explains."
+            if alarming(document)
+            else "Smooth samples are explained; what is left is motion faster than the samples."
         )
     return " ".join(parts)
 
 
-def _shaken(document: dict) -> bool:
-    """True where smooth samples are explained, and shocks are what is left."""
-    return bool(document["smooth"] and not document["smooth"]["unexplained"])
-
-
 def alarming(document: dict) -> bool:
     """True where something is left that is not motion faster than the samples."""
-    return document["unexplained"] and not _shaken(document)
+    # where smooth samples are explained, shocks are what is left
+    return (document["smooth"] or document)["unexplained"] and document["unexplained"]
 
 
 def clean(document: dict) -> bool:
@@ -162,7 +159,11 @@ def some(checks, most=8) -> str:
 def extended(diagnosis: Diagnosis) -> Answer:
     """The extended model: its effects, parameters and noise."""
     document = diagnosis.document
-    noise = noise_in_words(diagnosis)
+    parts = []
+    for (kind, unit), rows in noise_table(diagnosis).groupby(["kind", "unit"], sort=False):
+        size, declared = (span(sd.min(), sd.max(), unit) for sd in (rows.sd, rows.declared))
+        parts.append(f"{kind}s {size}, declared {declared}")
+    noise = f"noise sd of the triads, as the residual shows it: {'; '.join(parts)}"
     if not document["causes"]:
         lead = f"It is the plain model as it stands, {PAPERS}."
         return Answer(lead, [noise])
@@ -178,15 +179,6 @@ def extended(diagnosis: Diagnosis) -> Answer:
         " triad:"
     )
     return Answer(lead, [*items, noise])
-
-
-def noise_in_words(diagnosis: Diagnosis) -> str:
-    """The extended model's noise, by kind, beside the declared one."""
-    parts = []
-    for (kind, unit), rows in noise_table(diagnosis).groupby(["kind", "unit"], sort=False):
-        size, declared = (span(sd.min(), sd.max(), unit) for sd in (rows.sd, rows.declared))
-        parts.append(f"{kind}s {size}, declared {declared}")
-    return f"noise sd of the triads, as the residual shows it: {'; '.join(parts)}"
 
 
 def gained(diagnosis: Diagnosis) -> Answer:
@@ -220,22 +212,20 @@ def gained(diagnosis: Diagnosis) -> Answer:
     return Answer(lead, items, loud)
 
 
-def readings_in_words(causes) -> list[str]:
+def readings_in_words(causes) -> Iterator[str]:
     """Where readings count that were left out or turned back."""
     gaining = [DATA_EFFECTS.get(c["effect"]) for c in causes if c["heldout_gain_nats"] > 0]
     corrected = [item for item in gaining if item and item.kind == "readings"]
-    said = []
     if any(item.left_out for item in corrected):
-        said.append(
+        yield (
             "Readings that are left out count in the nats, by how far they miss what the extended"
             " model predicts; neither the residuals nor the positions have them."
         )
     if not all(item.left_out for item in corrected):
-        said.append(
+        yield (
             "Axes that are turned back count in all of these numbers: the plain model takes the"
             " readings as they were recorded."
         )
-    return said
 
 
 def residual_in_words(diagnosis: Diagnosis) -> str:
@@ -254,12 +244,9 @@ def residual_in_words(diagnosis: Diagnosis) -> str:
 def positions_in_words(diagnosis: Diagnosis) -> str:
     """Words on how far the positions moved, and their widths before and after."""
     gain, table = diagnosis.document["gain"], position_table(diagnosis)
-    widths = [
-        quantity(float(np.sqrt(np.mean(np.square(sds)))), None, "m")
-        for sds in (
-            table.base_sd, table.extended_sd, diagnosis.document["inflated"]["positions_sd_m"][1:]
-        )
-    ]  # fmt: skip
+    inflated = diagnosis.document["inflated"]["positions_sd_m"][1:]
+    sds = (np.square(x).mean() for x in (table.base_sd, table.extended_sd, inflated))
+    widths = [quantity(float(np.sqrt(square)), None, "m") for square in sds]
     if clean(diagnosis.document):
         return f"The positions stay; their sds are {widths[1]} (rms)."
     largest = table.loc[table.change.abs().idxmax()]

@@ -1,6 +1,7 @@
 """The page of `imuarray board`: how good, to be trusted or not and why, and what to do next."""
 
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -119,33 +120,32 @@ def advice(board: "Board", folder: Path = Path()) -> list[str]:
     ]
 
 
-def _wanting(board: "Board") -> list[str]:
+def _wanting(board: "Board") -> Iterator[str]:
     """Words on what a better recording would have, by the motion that was found."""
-    said, calibration = [], board.calibration
+    calibration = board.calibration
     gyroscopes = None if isinstance(board.first_order, str) else board.first_order.gyroscopes
     if gyroscopes and isinstance(gyroscopes.common, str):
-        said.append(
+        yield (
             "Leave the logger on while the board is turned from pose to pose: the size of the"
             " array is as uncertain as the gyroscopes' scale, which is not known"
             f" ({gyroscopes.common})."
         )
-    said += [f"Record what is missing: {item}." for item in missing(board.corrected, calibration)]
+    yield from (f"Record what is missing: {x}." for x in missing(board.corrected, calibration))
     speed = np.sqrt(np.mean(np.sum(calibration["angular_rate"].to_numpy() ** 2, axis=1)))
     if speed < SLOW:
-        said.append(
+        yield (
             f"Twist it harder: {np.degrees(speed):.0f} deg/s (rms) is slow, aim for"
             f" {np.degrees(SLOW):.0f}; what is said of the positions grows with the square of the"
             " angular rate."
         )
     worst = weakest_of(calibration)[0]
     if worst.sd > board.corrected.position_prior_sd:
-        said.append(f"Turn the board faster, and about all axes: {worst.words} is hardly known.")
+        yield f"Turn the board faster, and about all axes: {worst.words} is hardly known."
     if levelled(calibration):
-        said.append(
+        yield (
             "More motion of this kind gains little: what first order leaves of the sensors' scales"
             " limits the positions. More still poses, and moves between them, would help."
         )
-    return said
 
 
 def weakest(calibration: xr.Dataset) -> str:
@@ -172,19 +172,19 @@ def causes(calibration: xr.Dataset) -> list[str]:
     ]
 
 
-def before(board: "Board") -> list[str]:
+def before(board: "Board") -> Iterator[str]:
     """Words on what first order found."""
     if isinstance(board.first_order, str):
-        return [f"First order was left out: {board.first_order}."]
-    found, said = board.first_order, []
-    gyroscopes = found.gyroscopes
+        yield f"First order was left out: {board.first_order}."
+        return
+    found, gyroscopes = board.first_order, board.first_order.gyroscopes
     worst = 1e3 * float(np.max(found.triads.residual_rms))
-    said.append(
+    yield (
         f"{len(found.poses)} still poses show gravity to {number(worst, 2)} mm/s² at the worst"
         " accelerometer; a few mm/s² is what good poses leave. Gravity is taken as"
         f" {found.gravity:.6g} m/s²: 0.1 % off, it makes the array 0.1 % off."
     )
-    said += turned(board)
+    yield from turned(board)
     if gyroscopes is not None and not isinstance(gyroscopes.common, str):
         common = gyroscopes.common
         before_, after = (
@@ -192,20 +192,11 @@ def before(board: "Board") -> list[str]:
         )
         scale = 1 / common.scale - 1
         error = plus_minus(100 * abs(scale), 100 * common.scale_sd)
-        said.append(
+        yield (
             f"{len(common.first)} moves carry gravity from pose to pose to {after} degrees"
             f" ({before_} before the gyroscopes were calibrated); together the gyroscopes read"
             f" {error} % too {'much' if scale > 0 else 'little'}."
         )
-    return said
-
-
-def account(board: "Board") -> list[str]:
-    """Lines on what became of the logs, as a page has them."""
-    return [
-        f"{line.replace('+-', '±').replace('^2', '²').replace(' -', ' −')}."
-        for line in board.account
-    ]
 
 
 class Board(NamedTuple):
@@ -240,16 +231,17 @@ def write_board(board: Board, folder: Path) -> None:
 
 def html(board: Board) -> str:
     """report.html, every text escaped."""
+    left_out, found = isinstance(board.first_order, str), board.calibration
+    account = [
+        f"{line.replace('+-', '±').replace('^2', '²').replace(' -', ' −')}."
+        for line in board.account
+    ]
     return rendered(
-        "board.html.j2", board=board, verdict=verdict(board), facts=facts(board),
-        advice=advice(board), causes=causes(board.calibration),
-        positions=position_table(board.calibration), noise=noises(board), sure=SURE,
-        degree=DEGREE,
-        figures=pictured(board.corrected, board.calibration, PICTURES, suffixes=["png"]),
-        weakest=weakest(board.calibration), frame=frame(board.calibration),
-        before=before(board), account=account(board),
-        first_order=None if isinstance(board.first_order, str)
-        else parameter_table(board.first_order, board.recording),
+        "board.html.j2", board=board, sure=SURE, degree=DEGREE, account=account,
+        figures=pictured(board.corrected, found, PICTURES, suffixes=["png"]),
+        first_order=None if left_out else parameter_table(board.first_order, board.recording),
+        **{part.__name__: part(board) for part in (verdict, facts, advice, before, noises)},
+        **{part.__name__: part(found) for part in (causes, position_table, weakest, frame)},
     )  # fmt: skip
 
 

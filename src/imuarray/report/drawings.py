@@ -21,8 +21,11 @@ from imuarray.pictures.style import (
 )
 from imuarray.words import number, power_of_ten, spelled
 
-MODELS = {"base": {"color": VERMILLION, "marker": "o"}, "extended": {"color": BLUE, "marker": "s"}}
-NAMES = {"base": "plain model", "extended": "extended model"}
+MODELS = {
+    "base": {"color": VERMILLION, "marker": "o", "label": "plain model"},
+    "extended": {"color": BLUE, "marker": "s", "label": "extended model"},
+}
+BAND = {"color": "0.87", "lw": 0}  # where simulations are
 PLAIN = 0.05  # p-value below which a mark is filled
 ALIKE = SETTINGS.alike  # squared correlation from which two effects are one class
 DARK = 0.75  # from which numbers are white
@@ -59,9 +62,14 @@ def discrepancy_figure(table: pd.DataFrame, footer=()):
     figure = new_figure(footer, PAGE, 0.75 + 0.23 * len(names))
     for axes, part in by_kind(figure, table, sharey=True):
         axes.axvline(0, color=BLACK, linewidth=0.5)
-        for model, shift in (("base", -0.16), ("extended", 0.16)):
+        for (model, look), shift in zip(MODELS.items(), (-0.16, 0.16), strict=True):
             for row in part[part.model == model].itertuples():
-                _check(axes, row, names.index(row.label), shift)
+                place = names.index(row.label)
+                if model == "base":  # the band is that of the plain model
+                    axes.fill_between([-row.limit, row.limit], place - 0.36, place + 0.36, **BAND)
+                face = look["color"] if row.p_value <= PLAIN else "white"
+                axes.plot(row.standardised, place + shift, linestyle="", markersize=4.5,
+                          markerfacecolor=face, **look)  # fmt: skip
         axes.set(xlabel="sds of the simulated band", ylim=(len(names) - 0.4, -0.6))
         _wide_scale(axes, part.standardised)
     axes = figure.axes[0]
@@ -69,19 +77,9 @@ def discrepancy_figure(table: pd.DataFrame, footer=()):
     handles = _model_handles(axes, 4.5)
     handles += axes.plot([], [], linestyle="", marker="o", color=BLACK, markerfacecolor="white",
                          markersize=4.5, label=f"open: p > {PLAIN:g}")  # fmt: skip
-    handles.append(axes.fill_between([], [], [], color="0.87", lw=0, label="95 % of simulations"))
+    handles.append(axes.fill_between([], [], [], label="95 % of simulations", **BAND))
     legend_above(figure, handles)
     return figure
-
-
-def _check(axes, row, place, shift):
-    """A model's dot; and the band, that of the plain model."""
-    if row.model == "base":
-        axes.fill_between([-row.limit, row.limit], place - 0.36, place + 0.36, color="0.87", lw=0)
-    style = MODELS[row.model]
-    face = style["color"] if row.p_value <= PLAIN else "white"
-    axes.plot(row.standardised, place + shift, linestyle="", markersize=4.5,
-              markerfacecolor=face, **style)  # fmt: skip
 
 
 def _wide_scale(axes, values):
@@ -112,10 +110,7 @@ def _ticks_at_powers(axes, values, first: int, most: int, room: float, text):
 
 def _model_handles(axes, size) -> list:
     """A mark of each model for a legend."""
-    return [
-        axes.plot([], [], linestyle="", markersize=size, label=NAMES[model], **style)[0]
-        for model, style in MODELS.items()
-    ]
+    return [axes.plot([], [], linestyle="", markersize=size, **look)[0] for look in MODELS.values()]
 
 
 @styled
@@ -129,7 +124,7 @@ def residual_figure(table: pd.DataFrame, footer=()):
     handles = _model_handles(axes, 5)
     handles += axes.plot([], [], "_", color=GREY, markersize=5, label="single axes")
     handles += axes.plot([], [], "-", color=BLACK, linewidth=1.5, label="noise, extended model")
-    handles.append(axes.fill_between([], [], [], color="0.87", lw=0, label="as simulated, 95 %"))
+    handles.append(axes.fill_between([], [], [], label="as simulated, 95 %", **BAND))
     legend_above(figure, handles)
     return figure
 
@@ -142,8 +137,8 @@ def _residuals(axes, table):
         place = labels.index(row.imu)
         axes.plot([place - 0.3, place + 0.3], [row.noise] * 2, color=BLACK, linewidth=1.5,
                   solid_capstyle="butt", zorder=2)  # fmt: skip
-        axes.fill_between([place - 0.45, place + 0.45], 1 - row.half_width, 1 + row.half_width,
-                          color="0.87", lw=0)  # fmt: skip
+        half = row.half_width
+        axes.fill_between([place - 0.45, place + 0.45], 1 - half, 1 + half, **BAND)
     for model, shift in (("base", -0.17), ("extended", 0.17)):
         style = MODELS[model]
         for part, size, mark in ((single, 0.7 * large, "_"), (triads, large, style["marker"])):
@@ -257,13 +252,10 @@ def position_figure(table: pd.DataFrame, footer=()):
         part = table[table["axis"] == axis]
         places = np.array([labels.index(name) for name in part.imu])
         size = imu_ticks(axes, labels, 10)
-        for model, shift, centre in (
-            ("base", -0.15, 0 * part.change),
-            ("extended", 0.15, part.change),
-        ):
-            axes.errorbar(places + shift, factor * centre, factor * SURE * part[f"{model}_sd"],
-                          linestyle="", markersize=0.8 * size, elinewidth=0.9, label=NAMES[model],
-                          **MODELS[model])  # fmt: skip
+        for model, shift, moved in (("base", -0.15, 0.0), ("extended", 0.15, 1.0)):
+            half = factor * SURE * part[f"{model}_sd"]
+            axes.errorbar(places + shift, factor * (moved * part.change), half, linestyle="",
+                          markersize=0.8 * size, elinewidth=0.9, **MODELS[model])  # fmt: skip
         axes.axhline(0, color=BLACK, linewidth=0.5)
         axes.set_title(axis)
     panels[0].set_ylabel(f"change of position ({unit})")
@@ -317,7 +309,7 @@ def cause_figure(table: pd.DataFrame, footer=()):
     figure = new_figure(footer, PAGE, 2.35)
     panels = figure.subplots(1, count, squeeze=False)[0]
     for axes, (place, part) in zip(panels, table.groupby("panel"), strict=True):
-        (_own if place else _added_variable)(axes, part)
+        _means(axes, part.sort_values("x"), added=place == 0)
         axes.set_xlabel(part.x_label.iloc[0], size=7)
         axes.set_ylabel(part.y_label.iloc[0], size=7)
         axes.set_title(plain(part.title.iloc[0]), size=7.5)
@@ -326,27 +318,20 @@ def cause_figure(table: pd.DataFrame, footer=()):
     return figure
 
 
-def _added_variable(axes, table):
-    """Means of bins, and the line on which they ought to be."""
-    ends = np.array([table.x.min(), table.x.max()])
-    axes.plot(ends, ends, color=BLACK, linewidth=0.9, zorder=1)
-    several = table.series.nunique() > 1
-    for (name, part), look in zip(table.groupby("series"), LOOKS, strict=False):
-        _points(axes, part, marker=look["marker"], color=look["color"], label=name)
-    if several:
+def _means(axes, table, added: bool):
+    """Means of bins with two standard errors, and the line on which they ought to be.
+
+    ``added``: whether that is the diagonal of an added-variable plot; else the fitted cause.
+    """
+    if added:
+        ends = np.array([table.x.min(), table.x.max()])
+        axes.plot(ends, ends, color=BLACK, linewidth=0.9, zorder=1)
+    else:
+        axes.plot(table.x, table.model, color=BLUE, linewidth=1.1, zorder=1)
+    for (name, part), look in zip(table.groupby("series", dropna=False), LOOKS, strict=False):
+        axes.errorbar(part.x, part.y, 2 * part.se, linestyle="", markersize=3.2, elinewidth=0.7,
+                      marker=look["marker"], color=look["color"], label=name)  # fmt: skip
+    if not added:
+        axes.axhline(0, color=BLACK, linewidth=0.4)
+    elif table.series.nunique() > 1:
         axes.legend(fontsize=6)
-
-
-def _own(axes, table):
-    """Means of bins, and the fitted cause through them."""
-    table = table.sort_values("x")
-    axes.plot(table.x, table.model, color=BLUE, linewidth=1.1, zorder=1)
-    _points(axes, table, marker="o", color=VERMILLION)
-    axes.axhline(0, color=BLACK, linewidth=0.4)
-
-
-def _points(axes, table, **options):
-    """Means of bins with two standard errors."""
-    axes.errorbar(
-        table.x, table.y, 2 * table.se, linestyle="", markersize=3.2, elinewidth=0.7, **options
-    )

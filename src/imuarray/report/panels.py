@@ -5,6 +5,7 @@ refitted: what would be back in the residual without it. It is an added-variable
 residual and signal together are its ordinate, so that points on the line are explained.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -172,9 +173,9 @@ def time_panels(signal: Signal) -> list[pd.DataFrame]:
     return [axis_panel(signal, *place, time, "", "time (s)") for place in largest(power)]
 
 
-def parameter_panels(signal: Signal) -> list[pd.DataFrame]:
+def parameter_panels(signal: Signal) -> Iterator[pd.DataFrame]:
     """The most certain parameters, each axis's deviation against what the parameter multiplies."""
-    made, panels = signal.made, []
+    made = signal.made
     for imu, column in largest(signal.sure):
         derivative = made.whitened[:, imu, :, column]
         axis = int(np.argmax(np.sum(derivative**2, axis=0)))
@@ -183,8 +184,7 @@ def parameter_panels(signal: Signal) -> list[pd.DataFrame]:
         factor, label, root = abscissa(signal.effect, name)
         # a curved response bends the reading itself
         x = factor * (made.readings.values[:, imu, axis] if root else x)
-        panels.append(axis_panel(signal, imu, axis, x, f" ({name})" * (len(name) > 1), label))
-    return panels
+        yield axis_panel(signal, imu, axis, x, f" ({name})" * (len(name) > 1), label)
 
 
 # What a parameter multiplies: from SI to what is drawn.
@@ -205,26 +205,23 @@ def abscissa(effect: str, name: str) -> tuple[float, str, bool]:
     return factor, f"{quantity} {name[-1]} ({unit})", item.against == "reading"
 
 
-def delay_panels(signal: Signal) -> list[pd.DataFrame]:
+def delay_panels(signal: Signal) -> Iterator[pd.DataFrame]:
     """Delays: the gyroscope's deviation along domega/dt against its size."""
     readings, turn = signal.made.readings, signal.made.state.motion[:, 3:6]
     size = np.linalg.norm(turn, axis=1)
     way = turn / np.maximum(size, 1e-12)[:, None]
-    panels = []
     for imu, _ in largest(signal.sure):
         if readings.exists[imu, 1]:
             parts = (np.sum(v[:, imu, 3:] * way, axis=1) for v in (signal.total, signal.explained))
             found = binned(size, *parts, signal.width[imu, 3:].mean())
             title = f"gyroscope {readings.labels[imu]}, along dω/dt"
-            panels.append(
-                panel(found, title, "|dω/dt| (rad/s²)", "deviation", RATE, readings.sd[imu, 1])
-            )
-    return panels
+            sd = readings.sd[imu, 1]
+            yield panel(found, title, "|dω/dt| (rad/s²)", "deviation", RATE, sd)
 
 
-def clock_panels(signal: Signal) -> list[pd.DataFrame]:
+def clock_panels(signal: Signal) -> Iterator[pd.DataFrame]:
     """Clocks: the readings' age, from each sample alone, against the place in the sawtooth."""
-    made, panels = signal.made, []
+    made = signal.made
     clocks = made.columns.model.split(np.asarray(made.state.parameters))[signal.effect]
     score, information = delay_score(made)
     for imu in sorted(signal.imus, key=lambda k: -abs(clocks[k][0]))[:PANELS]:
@@ -246,38 +243,29 @@ def clock_panels(signal: Signal) -> list[pd.DataFrame]:
             "title": f"IMU {made.readings.labels[imu]}, {abs(frequency):.4g} Hz",
             "x_label": "time mod 1/f, twice (ms)", "y_label": "age of a reading (ms)",
         })  # fmt: skip
-        panels.append(pd.concat([frame, frame.assign(x=frame.x + 1e3 / abs(frequency))]))
-    return panels
+        yield pd.concat([frame, frame.assign(x=frame.x + 1e3 / abs(frequency))])
 
 
-def shift_panels(signal: Signal) -> list[pd.DataFrame]:
+def shift_panels(signal: Signal) -> Iterator[pd.DataFrame]:
     """A triad that moved: its position in blocks of time, from the residual without the step."""
-    made, imu, panels = signal.made, signal.imus[0], []
+    made, imu = signal.made, signal.imus[0]
     chosen = made.columns.of(POSITION)
-    blocks = blocks_of(len(made.residual), BLOCKS)
-    found = [position_of_block(signal, imu, chosen, block) for block in blocks]
-    for axis in range(3):
-        frame = pd.DataFrame(
-            [(t, *(value[axis] for value in values)) for t, *values in found],
-            columns=["x", "y", "se", "model"],
+    every, found = made.projected(chosen)[:, imu], []
+    for part in blocks_of(len(made.residual), BLOCKS):
+        own = made.whitened[part, imu][..., chosen].reshape(-1, 3)
+        projected = every[part].reshape(-1, 3)
+        inverse = scaled_inverse(own.T @ own - projected.T @ projected)
+        seen, step = (
+            inverse @ (own.T @ np.nan_to_num(values[part, imu]).ravel())
+            for values in (signal.total, signal.explained)
         )
+        time = np.full(3, made.readings.time[part].mean())
+        found.append([time, seen, np.sqrt(np.diag(inverse)), step])
+    for rows, axis in zip(np.moveaxis(found, -1, 0), AXES, strict=True):
+        frame = pd.DataFrame(rows, columns=["x", "y", "se", "model"])
         frame = frame[frame.se < VAGUE * frame.se.min()]
-        title = f"IMU {made.readings.labels[imu]}, position {AXES[axis]}"
-        panels.append(panel(frame, title, "time (s)", "from the mean", LENGTH, least=1.0))
-    return panels
-
-
-def position_of_block(signal: Signal, imu, chosen, part):
-    """(mean time, offset (3,) m, its sd, the same of the step alone) over some samples."""
-    made = signal.made
-    own = made.whitened[part, imu][..., chosen].reshape(-1, 3)
-    projected = made.projected(chosen)[part, imu].reshape(-1, 3)
-    inverse = scaled_inverse(own.T @ own - projected.T @ projected)
-    seen, step = (
-        inverse @ (own.T @ np.nan_to_num(values[part, imu]).ravel())
-        for values in (signal.total, signal.explained)
-    )
-    return float(made.readings.time[part].mean()), seen, np.sqrt(np.diag(inverse)), step
+        title = f"IMU {made.readings.labels[imu]}, position {axis}"
+        yield panel(frame, title, "time (s)", "from the mean", LENGTH, least=1.0)
 
 
 AGAINST = {  # by what an effect is drawn against: its panels, and what they show

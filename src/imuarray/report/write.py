@@ -1,5 +1,6 @@
 """The report of a diagnosis: diagnosis.json, report.html and the figures, in one folder."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,8 @@ from imuarray.report.page import SUFFIXES, Drawing, files, pictured, rendered
 from imuarray.report.panels import cause_table, panels_of
 from imuarray.words import imus_named, sensors_of, spelled
 
-FIGURES = {  # by name: table, drawing, title, caption
+# Figures by name: table, drawing, title, caption. First what the models leave and gain.
+FIT = {
     "discrepancies": (
         numbers.discrepancy_table, drawn.discrepancy_figure, "Measured against simulated",
         "Each check of the residual at its worst sensor, in sds of the band that simulations of the"
@@ -34,6 +36,8 @@ FIGURES = {  # by name: table, drawing, title, caption
         " cause, in the order of adoption, below it by the extended model over the plain model"
         " with declared and with inflated noise. A placebo ought to gain nothing.",
     ),
+}  # fmt: skip
+LIMITS = {  # what the recording can tell, after the causes
     "separability": (
         numbers.separability_table, drawn.separability_figure,
         "What this recording can distinguish",
@@ -89,21 +93,20 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> None:
 
 def draw(diagnosis: Diagnosis, calibration: xr.Dataset) -> list[Drawing]:
     """All figures in the report's order; those of causes only where there are any."""
-    document, said = diagnosis.document, footer(diagnosis.document)
-    first = ["discrepancies", "residual"] + (["gain"] if document["causes"] else [])
-    found = [_drawing(name, diagnosis, said) for name in first]
-    for place, cause in enumerate(diagnosis.found.search.causes):
-        table = cause_table(diagnosis, cause)
-        sensors = sensors_of(diagnosis.found.search.readings.labels, cause.imus)
-        found.append(Drawing(
-            f"cause_{place + 1:02d}_{cause.effect}",
-            f"Cause: {spelled(cause.effect)}, {imus_named(sensors)}",
+    document, search = diagnosis.document, diagnosis.found.search
+    said, labels, found = footer(document), search.readings.labels, []
+    causes = {
+        f"cause_{number:02d}_{cause.effect}": (
+            partial(cause_table, cause=cause), drawn.cause_figure,
+            f"Cause: {spelled(cause.effect)}, {imus_named(sensors_of(labels, cause.imus))}",
             CAUSE_CAPTION.format(panels_of(cause.effect)[1]),
-            files(drawn.cause_figure(table, said), table),
-        ))  # fmt: skip
-    found += [
-        _drawing(name, diagnosis, said) for name in ("separability", "detectable", "positions")
-    ]
+        )
+        for number, cause in enumerate(search.causes, 1)
+    }  # fmt: skip
+    for name, (make_table, make_figure, *texts) in (FIT | causes | LIMITS).items():
+        if name != "gain" or document["causes"]:
+            table = make_table(diagnosis)
+            found.append(Drawing(name, *texts, files(make_figure(table, said), table)))
     alike = "board", "timeline", "sphere", "course"
     return found + pictured(diagnosis.recording, calibration, alike, said)
 
@@ -116,13 +119,6 @@ def footer(document: dict) -> list[str]:
         f"{drawn.plain(path)}; {document['samples']} samples,"
         f" seed {document['seed']}, imuarray {document['version']}"
     ]
-
-
-def _drawing(name: str, diagnosis: Diagnosis, footer) -> Drawing:
-    """One of the figures that every report has."""
-    make_table, make_figure, *texts = FIGURES[name]
-    table = make_table(diagnosis)
-    return Drawing(name, *texts, files(make_figure(table, footer), table))
 
 
 def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:

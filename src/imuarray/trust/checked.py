@@ -5,7 +5,6 @@ numbers all the same.
 """
 
 import json
-from collections.abc import Iterable
 
 import numpy as np
 import xarray as xr
@@ -41,7 +40,11 @@ def require_fit(calibration: xr.Dataset, recording: Recording | None = None) -> 
             _require_numbers(calibration[name], dimensions)
         elif name in needed:
             raise InputError(f"expected a calibration (imuarray calibrate), found no {name}")
-    _require_right_axes(str(calibration.attrs.get("corrected_readings", "")).split())
+    for name in str(calibration.attrs.get("corrected_readings", "")).split():
+        # mended in memory: the readings of the file are as they were
+        right = name in DATA_EFFECTS and DATA_EFFECTS[name].left_out
+        found = f"{name}: give the axes in columns.yaml, convert the log again, and calibrate that"
+        require(right, "", "a calibration of readings with the right axes", found)
     if recording is not None:
         require_labels(calibration, recording)
     if "effect_parameter" in calibration:
@@ -52,17 +55,6 @@ def require_fit(calibration: xr.Dataset, recording: Recording | None = None) -> 
             _require_covariance(calibration[name])
     if recording is not None:
         _require_board(calibration, recording)
-
-
-def _require_right_axes(corrected: Iterable[str]) -> None:
-    """InputError where readings were mended in memory: those of the file are as they were.
-
-    ``corrected``: data effects that a diagnosis has found.
-    """
-    for name in corrected:
-        right = name in DATA_EFFECTS and DATA_EFFECTS[name].left_out
-        found = f"{name}: give the axes in columns.yaml, convert the log again, and calibrate that"
-        require(right, "", "a calibration of readings with the right axes", found)
 
 
 def effect_names(calibration: xr.Dataset) -> list[str]:

@@ -5,6 +5,7 @@ chance allows is compared with what a known mistake would make of the drawing: a
 turned, inverted or mirrored array, two IMUs exchanged.
 """
 
+from collections.abc import Iterator
 from itertools import combinations
 from typing import NamedTuple
 
@@ -44,10 +45,6 @@ class Places(NamedTuple):
         """True where the positions are known better than by the drawing."""
         coordinates = 3 * (len(self.found) - 1)
         return float(np.trace(self.covariance)) < coordinates * self.prior_sd**2
-
-    def size(self) -> float:
-        """Extent found over the nominal one."""
-        return float(np.linalg.norm(centred(self.found)) / np.linalg.norm(centred(self.nominal)))
 
 
 def centred(places) -> np.ndarray:
@@ -107,8 +104,9 @@ def another_size(places: Places) -> str | None:
 
     Positions that the recording hardly tells may have any size: then only that of a mistake.
     """
-    size, drawn = places.size(), centred(places.nominal)
-    off = np.linalg.norm(centred(places.found) / size - drawn) / np.linalg.norm(drawn)
+    found, drawn = centred(places.found), centred(places.nominal)
+    size = float(np.linalg.norm(found) / np.linalg.norm(drawn))
+    off = np.linalg.norm(found / size - drawn) / np.linalg.norm(drawn)
     fitted, sd = size_of(places)
     other = abs(fitted - 1) > SETTINGS.far * sd and off < SETTINGS.same_shape
     if not other or SETTINGS.sizes[0] < size < SETTINGS.sizes[1]:
@@ -161,34 +159,30 @@ def _explained(places: Places) -> str | None:
     return ", or ".join([best, *others[:2]])
 
 
-def _explanations(places: Places) -> list[tuple[str, np.ndarray, int]]:
+def _explanations(places: Places) -> Iterator[tuple[str, np.ndarray, int]]:
     """Mistakes in words, the drawing (A, 3) m that each would make, the number of its unknowns."""
-    nominal, labels = places.nominal, places.labels
-    size, _ = size_of(places)
+    nominal, labels, out = places.nominal, places.labels, "the array comes out"
+    wrong = "specific force of the wrong sign (gravity's instead of minus gravity's)?"
+    yield f"{out} inverted: {wrong}", -nominal, 1
     turn, _ = Rotation.align_vectors(centred(places.found), centred(nominal))
-    found = [
-        ("the array comes out inverted: specific force of the wrong sign (gravity's instead of"
-         " minus gravity's)?", -nominal, 1),
-        (f"the array comes out turned by {angle_words(turn)}: are the sensors in the drawing's"
-         " frame?", turn.apply(nominal), 3),
-    ]  # fmt: skip
+    frame = "are the sensors in the drawing's frame?"
+    yield f"{out} turned by {angle_words(turn)}: {frame}", turn.apply(nominal), 3
+    size, _ = size_of(places)
     if size > 0:
-        found.append((size_words(size), size * nominal, 1))
+        yield size_words(size), size * nominal, 1
     for axis, flip in zip("xyz", 1 - 2 * np.eye(3), strict=True):
-        said = f"the array comes out mirrored in {axis}: {_mirrored_words(places)}?"
-        found.append((said, nominal * flip, 1))
+        yield f"{out} mirrored in {axis}: {_mirrored_words(places)}?", nominal * flip, 1
     for i, j in combinations(range(len(nominal)), 2):
         order = np.arange(len(nominal))
         order[[i, j]] = j, i
-        said = f"IMUs {labels[i]} and {labels[j]} come out at each other's place: were they"
-        found.append((f"{said} exchanged?", nominal[order], 1))
+        said = f"IMUs {labels[i]} and {labels[j]} come out at each other's place"
+        yield f"{said}: were they exchanged?", nominal[order], 1
     for k, label in enumerate(labels):
         moved = nominal.copy()
         moved[k] += _apart(places, k)
         distance = 1e3 * np.linalg.norm(moved[k] - nominal[k])
-        said = f"IMU {label} comes out {distance:.3g} mm from its place: is it the one drawn there?"
-        found.append((said, moved, 3))
-    return found
+        said = f"IMU {label} comes out {distance:.3g} mm from its place"
+        yield f"{said}: is it the one drawn there?", moved, 3
 
 
 def _mirrored_words(places: Places) -> str:

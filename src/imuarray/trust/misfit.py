@@ -166,11 +166,11 @@ class Poses(NamedTuple):
 def of_first_order(found: FirstOrder) -> Poses:
     """From the answer."""
     common = None if found.gyroscopes is None else found.gyroscopes.common
-    scale = np.nan if common is None or isinstance(common, str) else common.scale
-    fit, follow = found.triads, [getattr(found, f"{kind}_smoothing") for kind in KINDS]
-    return _poses(
-        fit.residual_ratio, fit.residual, fit.relied, scale, found.gyroscope_matrix, follow
-    )
+    own = {f"{kind}_smoothing": getattr(found, f"{kind}_smoothing") for kind in KINDS}
+    own |= {"residual": found.triads.residual, "used": found.triads.relied}
+    if not (common is None or isinstance(common, str)):
+        own |= {"gyroscope_common": common.map, "gyroscope_matrix": found.gyroscope_matrix}
+    return _poses(own, found.triads.residual_ratio)
 
 
 def of_file(path) -> Poses:
@@ -179,26 +179,23 @@ def of_file(path) -> Poses:
         if FIRST_ORDER not in file:
             return Poses()
         stored = file[FIRST_ORDER]
-        ratio = float(np.ravel(stored.attrs.get("residual_ratio", 1.0))[0])
-        common = stored["gyroscope_common"][:] if "gyroscope_common" in stored else [[np.nan]]
-        maps = stored["gyroscope_matrix"][:] if "gyroscope_matrix" in stored else None
-        residual, used = stored["residual"][:], stored["used"][:] != 0
-        names = (f"{kind}_smoothing" for kind in KINDS)
-        follow = [stored[name][:] if name in stored else np.zeros(1) for name in names]
-    return _poses(ratio, residual, used, float(np.trace(common) / 3), maps, follow)
+        return _poses(stored, float(np.ravel(stored.attrs.get("residual_ratio", 1.0))[0]))
 
 
-def _poses(ratio: float, residual, used, scale: float, maps, follow) -> Poses:
-    """With residuals (P, A, 3) where they are ``used`` (P, A), gyroscopes' ``maps`` (G, 3, 3).
+def _poses(stored, ratio: float) -> Poses:
+    """From arrays by their names in a file: ``residual`` (P, A, 3) where ``used`` (P, A), maps.
 
-    ``follow``: of both kinds, the correlation of neighbours in the fastest noise.
+    And of both kinds the correlation of neighbours in the fastest noise, ``_smoothing``.
     """
-    pairs = zip(KINDS, follow, strict=True)
-    smoothed = tuple(kind for kind, own in pairs if np.nanmedian(own) > SETTINGS.smoothed)
-    squares = np.where(used[..., None], residual**2, np.nan)
+    names = {kind: f"{kind}_smoothing" for kind in KINDS}
+    follow = {kind: np.nanmedian(stored[name][:]) for kind, name in names.items() if name in stored}
+    smoothed = tuple(kind for kind, own in follow.items() if own > SETTINGS.smoothed)
+    squares = np.where(stored["used"][:][..., None] != 0, stored["residual"][:] ** 2, np.nan)
     worst = np.sqrt(np.nanmax(np.nanmean(np.ascontiguousarray(squares), axis=(0, 2))))
-    chance = shared_chance(maps) if scale == scale else 1.0
-    return Poses(ratio, float(worst), scale, chance, smoothed)
+    if "gyroscope_common" not in stored:
+        return Poses(ratio, float(worst), smoothed=smoothed)
+    scale, maps = np.trace(stored["gyroscope_common"][:]) / 3, stored["gyroscope_matrix"][:]
+    return Poses(ratio, float(worst), float(scale), shared_chance(maps), smoothed)
 
 
 def reasons_of_poses(*several: Poses) -> list[str]:

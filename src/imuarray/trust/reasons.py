@@ -201,7 +201,7 @@ def reasons_of_motion(
     """
     said, places = reasons_in(calibration), _places_of(recording, calibration)
     residual = {"": ratio} if effect_names(calibration) else rigid(recording, places)
-    found = _judged(recording, places, residual) + _elsewhere(kept(recording), places)
+    found = _judged(recording, places, residual) + elsewhere(kept(recording), places.found)
     found += _of_another_time(recording, calibration, own_clocks)
     found += [AS_READ] if as_read else []
     return [f"the calibration is not to be trusted: {reason}" for reason in said] + [
@@ -292,19 +292,6 @@ def _little(recording: Recording, places: Places) -> list[str]:
     return [
         f"the recording says little of the positions: they are known to {1e3 * rms:.2g} mm by it,"
         f" to {1e3 * prior:.2g} mm by the drawing; {more}"
-    ]
-
-
-def _elsewhere(moving: Recording, places: Places) -> list[str]:
-    """One sentence where a recording that is not calibrated anew fits other positions better."""
-    if len(moving.time) < SETTINGS.few_samples:
-        return []
-    ratio, distance = elsewhere(moving, places.found)
-    if ratio < SETTINGS.better_elsewhere:
-        return []
-    return [
-        f"this recording fits positions {1e3 * distance:.2g} mm rms from the calibration's better,"
-        f" with {ratio:.2g} times less residual: is it the calibration of another board?"
     ]
 
 

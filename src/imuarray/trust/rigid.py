@@ -114,8 +114,13 @@ def slope(time, motion: Turning) -> Slope | None:
     )  # fmt: skip
 
 
-def elsewhere(recording: Recording, positions) -> tuple[float, float]:
-    """Gain of accelerometers moved off ``positions`` (A, 3) m: ratio of residuals, rms move m."""
+def elsewhere(recording: Recording, positions) -> list[str]:
+    """One sentence where accelerometers fit better off ``positions`` (A, 3) m, not calibrated anew.
+
+    By the ratio of residuals before and after they are moved.
+    """
+    if len(recording.time) < SETTINGS.few_samples:
+        return []
     force, places = recording.specific_force, np.array(positions)
     rate = np.median(recording.angular_rate, axis=1)
     left = []
@@ -126,8 +131,14 @@ def elsewhere(recording: Recording, positions) -> tuple[float, float]:
         arms = np.moveaxis(motion.at(np.eye(3)) - motion.at(np.zeros((1, 3))), 1, 2)  # (T, 3, 3)
         known = np.einsum("tia,tib->ab", arms, arms)
         places += np.linalg.lstsq(known, np.einsum("tia,tki->ak", arms, off), rcond=1e-9)[0].T
-    moved = places - places[0] - (positions - positions[0])
-    return float(left[0] / max(left[-1], 1e-300)), float(np.sqrt(np.mean(moved**2)))
+    moved, ratio = places - places[0] - (positions - positions[0]), left[0] / max(left[-1], 1e-300)
+    if ratio < SETTINGS.better_elsewhere:
+        return []
+    return [
+        f"this recording fits positions {1e3 * np.sqrt(np.mean(moved**2)):.2g} mm rms from the"
+        f" calibration's better, with {ratio:.2g} times less residual: is it the calibration of"
+        " another board?"
+    ]
 
 
 def kept(recording: Recording) -> Recording:

@@ -12,7 +12,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from imuarray.recording import Recording
-from imuarray.recording.record import few
+from imuarray.recording.record import KINDS, few
 from imuarray.recording.units import GRAVITY
 from imuarray.trust.drawing import DEGREE, angle_words
 from imuarray.trust.rigid import runs, slope, turning
@@ -28,8 +28,8 @@ def suspects(recording: Recording) -> list[str]:
     at a rail.
     """
     words: dict[tuple[str, str], list[str]] = {}
-    for kind, find in (("accelerometer", _accelerometers), ("gyroscope", _gyroscopes)):
-        for found in find(recording):
+    for kind in KINDS:
+        for found in _search(recording, kind):
             words.setdefault(found, []).append(kind)
     return [
         f"{'IMU' if len(kinds) == 2 else kinds[0]} {label} {said or 'does not fit the others'}"
@@ -37,46 +37,29 @@ def suspects(recording: Recording) -> list[str]:
     ]
 
 
-def _gyroscopes(recording: Recording) -> list[tuple[str, str]]:
-    rates = recording.angular_rate
-
-    def others(left):
-        """Readings of each gyroscope by the others that are left (T, G, 3)."""
-        parts = [np.setdiff1d(left, [k]) for k in range(rates.shape[1])]
-        return np.stack([np.median(rates[:, part], axis=1) for part in parts], axis=1)
-
-    places, rate = recording.relative_positions(), np.median(rates, axis=1)
-    rise = turning(recording.specific_force, rate, places).acceleration
-    labels, sd = recording.gyroscope_labels, recording.gyroscope_noise_sd
-    return _search(rates, others, labels, sd, runs(recording.time), rise)
-
-
-def _accelerometers(recording: Recording) -> list[tuple[str, str]]:
-    force, places = recording.specific_force, recording.relative_positions()
-    rate = np.median(recording.angular_rate, axis=1)
-
-    def others(left):
-        """Readings of each accelerometer by the others that are left (T, A, 3)."""
-        found = np.empty(force.shape)
-        for k in range(force.shape[1]):
-            part = np.setdiff1d(left, [k])
-            found[:, k] = turning(force[:, part], rate, places[part]).at(places[k : k + 1])[:, 0]
-        return found
-
-    labels, sd = recording.accelerometer_labels, recording.accelerometer_noise_sd
-    return _search(force, others, labels, sd, runs(recording.time))
-
-
-def _search(readings, others, labels, sd, chain, rise=None) -> list[tuple[str, str]]:
+def _search(recording: Recording, kind: str) -> list[tuple[str, str]]:
     """Labels, and what would make the triads agree with the others (empty if nothing known does).
 
     One after the other: the worst is named and left out, until the rest agree.
     """
-    count = readings.shape[1]
+    readings, places = getattr(recording, KINDS[kind]), recording.relative_positions()
+    force, rate = recording.specific_force, np.median(recording.angular_rate, axis=1)
+    labels, sd = getattr(recording, f"{kind}_labels"), getattr(recording, f"{kind}_noise_sd")
+    turns = kind == "gyroscope"
+    rise = turning(force, rate, places).acceleration if turns else None
+    chain, count = runs(recording.time), readings.shape[1]
+
+    def others(left):
+        """Readings of each triad by the others that are left (T, K, 3)."""
+        parts = [np.setdiff1d(left, [k]) for k in range(count)]
+        return np.stack([
+            np.median(readings[:, part], axis=1) if turns
+            else turning(force[:, part], rate, places[part]).at(places[k : k + 1])[:, 0]
+            for k, part in enumerate(parts)
+        ], axis=1)  # fmt: skip
+
     left = np.arange(count)
     found: list[tuple[str, str]] = []
-    if count < 3:
-        return []
     while len(left) > max(2, count / 2):
         expected = others(left)
         error = np.sqrt(np.mean((readings - expected) ** 2, axis=(0, 2)))
@@ -98,7 +81,16 @@ def explain(readings, expected, chain, rise=None) -> str:
     per second, where it is known without neighbours.
     """
     before = np.sqrt(np.mean((readings - expected) ** 2))
-    tries = [_axes(readings, expected), _turned(readings, expected), *_scaled(readings, expected)]
+    rotation, _ = Rotation.align_vectors(readings, expected)
+    factor = np.sum(readings * expected) / np.sum(expected**2)
+    offset = (readings - expected).mean(axis=0)
+    # one axis of the wrong sign is no rotation; a rotation by 90 degrees is both
+    turned = 0.999 * _rms(readings - rotation.apply(expected))
+    tries = [
+        _axes(readings, expected), (turned, f"is turned by {angle_words(rotation)}"),
+        (_rms(readings - factor * expected), f"reads {factor:.4g} times what it should"),
+        (_rms(readings - expected - offset), f"is off by a constant {_rms(offset):.3g}"),
+    ]  # fmt: skip
     # four samples on either side
     middle = chain[np.isin(chain - 4, chain) & np.isin(chain + 1, chain)]
     if len(middle) > SETTINGS.fewest_pairs:
@@ -127,22 +119,6 @@ def _axes(readings, expected) -> tuple[float, str]:
         return (left, f"has {_axes_named(wrong)} of the wrong sign") if wrong else (np.inf, "")
     names = [f"{'-' if s < 0 else ''}{'xyz'[k]}" for k, s in zip(order, signs, strict=True)]
     return left, f"reads {', '.join(names)} in place of x, y, z"
-
-
-def _turned(readings, expected) -> tuple[float, str]:
-    rotation, _ = Rotation.align_vectors(readings, expected)
-    left = _rms(readings - rotation.apply(expected))
-    # one axis of the wrong sign is no rotation; a rotation by 90 degrees is both
-    return 0.999 * left, f"is turned by {angle_words(rotation)}"
-
-
-def _scaled(readings, expected) -> list[tuple[float, str]]:
-    factor = np.sum(readings * expected) / np.sum(expected**2)
-    offset = (readings - expected).mean(axis=0)
-    return [
-        (_rms(readings - factor * expected), f"reads {factor:.4g} times what it should"),
-        (_rms(readings - expected - offset), f"is off by a constant {_rms(offset):.3g}"),
-    ]
 
 
 def _late(readings, expected, middle) -> tuple[float, str]:
@@ -236,7 +212,7 @@ def gravity(recording: Recording) -> list[str]:
 def clipped(recording: Recording) -> list[str]:
     """A sentence for each channel that ends abruptly within its declared range."""
     found = []
-    for kind in ("accelerometer", "gyroscope"):
+    for kind in KINDS:
         values = _as_read(recording, kind)
         for k, axis in np.ndindex(values.shape[1:]):
             rails = ends(values[:, k, axis])
@@ -269,7 +245,7 @@ def wrapped(recording: Recording) -> list[str]:
 
 def _as_read(recording: Recording, kind: str) -> np.ndarray:
     """Readings (T, K, 3) before first order corrected them: a rail is one value there only."""
-    values = recording.specific_force if kind == "accelerometer" else recording.angular_rate
+    values = getattr(recording, KINDS[kind])
     if recording.correction is None:
         return values
     inverse, offset = (recording.correction[f"{kind}_{name}"] for name in ("inverse", "offset"))
