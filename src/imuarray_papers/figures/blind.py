@@ -1,15 +1,13 @@
 """The blind study: what an effect is taken for, and what was asked of the diagnosis."""
 
-from functools import partial
-
 import numpy as np
 import pandas as pd
 
-from imuarray.pictures.style import BLACK, BLUE, PAGE, VERMILLION, new_figure, shade, styled
+from imuarray.pictures.style import BLACK, BLUE, PAGE, VERMILLION, shade
 from imuarray_papers.blind import summary
 from imuarray_papers.blind.inject import CATALOGUE
 from imuarray_papers.blind.summary import CRASH, NOTHING, UNEXPLAINED
-from imuarray_papers.figures.style import Column, scale_line
+from imuarray_papers.figures.style import Column, drawing, scale_line
 
 GROUPS = {
     "one": "one effect,\n8 σ or more", "clean": "", "gauge": "gauges",
@@ -71,16 +69,14 @@ def figure_blind_confusion(rows: dict, settings: dict):
         " Blue: right by class; vermillion and bold: wrong, in all or some of them. A recording"
         " with several names is in several columns; unexplained: the flag, whatever is named.",
     )
-    return partial(_draw_confusion, footer=footer), found
+    lines = confusion_rows(found)[["kind", "truth"]].drop_duplicates()
+    return drawing(_confusion, [footer], PAGE, 1.3 + 0.165 * len(lines)), found
 
 
-@styled
-def _draw_confusion(found, footer):
-    table = confusion_rows(found)
+def _confusion(figure, found):
+    table, axes = confusion_rows(found), figure.subplots()
     columns = names_of(table)
     lines = list(dict.fromkeys(zip(table.kind, table.truth, strict=True)))
-    figure = new_figure([footer], PAGE, 1.3 + 0.165 * len(lines))
-    axes = figure.subplots()
     counts = table.drop_duplicates(["kind", "truth"]).recordings
     place = {line: number for number, line in enumerate(lines)}
     for row in table.itertuples():
@@ -91,7 +87,6 @@ def _draw_confusion(found, footer):
     axes.xaxis.tick_top()
     axes.set(xlim=(-0.5, len(columns) - 0.5), ylim=(len(lines) - 0.5, -0.5))
     _separate(axes, lines, columns)
-    return figure
 
 
 def _cell(axes, column: int, line: int, row) -> None:

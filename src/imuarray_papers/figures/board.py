@@ -6,8 +6,8 @@ And its recordings' diagnoses: do positions, and the causes' numbers, agree?
 import numpy as np
 import pandas as pd
 
-from imuarray.pictures.style import PAGE, logarithmic, look, new_figure, styled
-from imuarray_papers.figures.style import Column, rms
+from imuarray.pictures.style import PAGE, logarithmic, look
+from imuarray_papers.figures.style import Column, drawing, rms
 from imuarray_papers.measured.positions import agreement, coordinate_table, pairwise
 
 MODELS = ("base", "inflated", "extended")  # sections of a diagnosis that have positions
@@ -20,10 +20,12 @@ SERIES = {
 }
 
 
-@styled
-def draw_past_rail(table: pd.DataFrame, rail_dps: float, footer=()):
+def figure_past_rail(rail_dps: float, footer=()):
     """Median error and RMSE of the withheld readings over the angular rate; log-log."""
-    figure = new_figure(footer, PAGE, 2.8)
+    return drawing(_past_rail, footer, PAGE, rail_dps=rail_dps)
+
+
+def _past_rail(figure, table, rail_dps):
     panels = figure.subplots(1, 2, sharey=True)
     # a normal error of sd 1 has the median 0.674
     columns = (
@@ -45,7 +47,6 @@ def draw_past_rail(table: pd.DataFrame, rail_dps: float, footer=()):
         axes.set_title(title)
     panels[0].set_ylabel("error of the predicted reading (deg/s)")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    return figure
 
 
 CAUSES = (

@@ -1,16 +1,14 @@
 """Effects that were hidden in recordings: what was found, and what it is worth."""
 
-from functools import partial
-
 import numpy as np
 import pandas as pd
 
 from imuarray.geometry import Array
 from imuarray.model.effects import known_effect
-from imuarray.pictures.style import BLACK, PAGE, new_figure, styled
+from imuarray.pictures.style import BLACK, PAGE
 from imuarray_papers.blind.study import accuracy, classes
 from imuarray_papers.figures.criticism import draw_gained, estimated, letter, three_digits
-from imuarray_papers.figures.style import Column, marks, panels, rms
+from imuarray_papers.figures.style import Column, drawing, marks, panels, rms
 
 MODELS = {"base": "papers'", "inflated": "noise inflated", "extended": "extended"}
 
@@ -49,7 +47,7 @@ def figure_criticism_hidden(diagnosis: tuple, truth: dict, recordings: Array):
         " positions take up. (d) rms error of the positions, and how many of the 95 % intervals"
         " hold the truth."
     ]
-    return partial(_draw_hidden, footer=footer), three_digits(table)
+    return drawing(_draw_hidden, footer, PAGE, 2.5), three_digits(table)
 
 
 def _arms(document: dict, truth: dict, turns) -> pd.DataFrame:
@@ -63,9 +61,7 @@ def _arms(document: dict, truth: dict, turns) -> pd.DataFrame:
     return pd.DataFrame({"found_m": both[0].ravel(), "true_m": both[1].ravel()})
 
 
-@styled
-def _draw_hidden(table, footer):
-    figure = new_figure(footer, PAGE, 2.5)
+def _draw_hidden(figure, table):
     axes = figure.subplots(1, 4)
     part = dict(list(table.groupby("panel")))
     sizes = part["wrong"].groupby("model").rms.max()
@@ -81,7 +77,6 @@ def _draw_hidden(table, footer):
     said = f"held out: +{gain:.1f} ± {error:.1f} nats"
     draw_gained(axes[3], part["gained"], said, "error of positions (µm)")
     letter(axes)
-    return figure
 
 
 def _draw_residuals(axes, rows) -> None:

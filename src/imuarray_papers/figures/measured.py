@@ -1,14 +1,12 @@
 """Measured recordings: agreement between them, first order, still noise."""
 
-from functools import partial
-
 import numpy as np
 import pandas as pd
 from scipy.special import ndtr
 
 from imuarray.pictures.noise import KINDS, deviation_lines
-from imuarray.pictures.style import BLACK, PAGE, logarithmic, look, new_figure, styled
-from imuarray_papers.figures.style import Column, panels, rms
+from imuarray.pictures.style import BLACK, PAGE, logarithmic, look
+from imuarray_papers.figures.style import Column, drawing, panels, rms
 
 FIRST_ORDER = (
     Column("recording", "recording", "recording"),
@@ -92,12 +90,10 @@ def figure_measured_agreement(summary: pd.DataFrame, pairs: pd.DataFrame, group:
     own = pairs.samples == summary.samples.max()
     pairs = pairs.loc[own, ["samples", "assumed", "z"]].round({"z": 2})  # differences, some tiny
     table = panels(summary=summary, pairs=pairs).astype({"assumed": str})
-    return partial(_draw_agreement, footer=footer), table
+    return drawing(_draw_agreement, footer, PAGE, 2.7), table
 
 
-@styled
-def _draw_agreement(table, footer):
-    figure = new_figure(footer, PAGE, 2.7)
+def _draw_agreement(figure, table):
     left, middle, right = figure.subplots(1, 3)
     pairs, summary = table[table.panel == "pairs"], table[table.panel == "summary"]
     most = summary.samples.max()
@@ -129,7 +125,6 @@ def _draw_agreement(table, footer):
     right.set(xscale="log", ylim=(0, 102), xlabel="samples $T$", ylabel="covered (%)",
               title="95 % intervals (filled)\nand 50 % intervals (open)")  # fmt: skip
     figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    return figure
 
 
 def figure_measured_noise(allan: pd.DataFrame, name: str, settings: dict):
@@ -147,15 +142,12 @@ def figure_measured_noise(allan: pd.DataFrame, name: str, settings: dict):
         f"Still poses of recording {name}. Black: the papers' σa ="
         f" {noise['accelerometer_sd']:g} m/s² and σg = {noise['gyroscope_sd_dps']:g} deg/s."
     ]
-    return partial(_draw_noise, papers=papers, footer=footer), allan
+    return drawing(_draw_noise, footer, PAGE, papers=papers), allan
 
 
-@styled
-def _draw_noise(allan, papers, footer):
-    figure = new_figure(footer, PAGE, 2.8)
+def _draw_noise(figure, allan, papers):
     for axes, sensor in zip(figure.subplots(1, 2), KINDS, strict=True):
         taus = deviation_lines(axes, allan, sensor)
         white = KINDS[sensor][0] * papers[sensor] * np.sqrt(taus[0] / taus)
         axes.plot(taus, white, color=BLACK, linewidth=1.2, label="papers' σ, white")
         axes.legend()
-    return figure

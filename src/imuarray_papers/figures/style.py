@@ -8,10 +8,25 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from imuarray.pictures.style import look, saved
+from imuarray.pictures.style import COLUMN, look, new_figure, saved, styled
 from imuarray.provenance import write_bytes, write_csv
 
 DIGITS, ERROR_DIGITS = 5, 3  # significant, of a published number and of its standard error
+
+
+def drawing(draw: Callable, footer=(), width=COLUMN, height=2.8, **given) -> Callable:
+    """The function of a table that gives its figure, in inches, with ``footer`` lines below.
+
+    ``draw(figure, table, **given)`` fills the empty figure.
+    """
+
+    @styled
+    def drawn(table: pd.DataFrame) -> Figure:
+        figure = new_figure(footer, width, height)
+        draw(figure, table, **given)
+        return figure
+
+    return drawn
 
 
 def legend_items(axes, last=()):
