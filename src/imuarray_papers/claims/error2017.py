@@ -3,17 +3,8 @@
 import numpy as np
 from scipy.special import chdtrc
 
-from imuarray_papers.claims.registry import (
-    claim,
-    listed,
-    near,
-    power_law,
-    ratio,
-    rises,
-    show,
-    untested,
-    verdict,
-)
+from imuarray_papers.claims.numbers import listed, near, power_law, ratio, rises, show
+from imuarray_papers.claims.registry import claim, untested, verdict
 
 SAMPLES = "calibration/position_error_samples"
 MOTION = "calibration/position_error_motion"

@@ -3,17 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from imuarray_papers.claims.registry import (
-    by_samples,
-    claim,
-    listed,
-    near,
-    power_law,
-    rises,
-    show,
-    tiny,
-    verdict,
-)
+from imuarray_papers.claims.numbers import by_samples, listed, near, power_law, rises, show, tiny
+from imuarray_papers.claims.registry import claim, verdict
 
 EXACT = "rounding only"
 SWEEP = "tuning/variance_T{}"

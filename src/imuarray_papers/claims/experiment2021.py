@@ -8,16 +8,10 @@ from scipy.special import bdtr
 
 from imuarray.geometry import UNDERSIDE_ROTATION
 from imuarray.recording.units import GRAVITY
+from imuarray_papers.claims.numbers import by_samples, falls, listed, show
 from imuarray_papers.claims.posterior2021 import covered
-from imuarray_papers.claims.registry import (
-    by_samples,
-    claim,
-    falls,
-    listed,
-    show,
-    untested,
-    verdict,
-)
+from imuarray_papers.claims.registry import claim, untested, verdict
+from imuarray_papers.claims.results import SEVERAL
 
 RANGE = 157.0  # m/s^2, where the accelerometers saturate
 
@@ -187,24 +181,18 @@ def centred(results):
     return verdict(f"mean ({listed(1e3 * above)}) mm", "", bool(stands))
 
 
-def agreement(results):
-    """Coverage between recordings by assumed sigma_a, at the largest T; None of a single one."""
-    table = results.of_board(f"agreement/{results.board}")
-    if table is None:
-        return None
+def agreement(results, otherwise=SEVERAL):
+    """Coverage between recordings by assumed sigma_a, at the largest T."""
+    table = results.of_board(f"agreement/{results.board}", otherwise)
     table = table[table.samples == results.samples[-1]]
     return table.set_index(table.assumed.astype(str))
 
 
 @claim("2021-52")
 def underestimated(results):
-    table = agreement(results)
-    if table is None:
-        chance = float(bdtr(10, 15, 1 - 1 / 31))
-        return untested(
-            "several measured recordings needed",
-            f"10 or fewer of 15 has probability {show(chance, 2)} at 97 %",
-        )
+    chance = float(bdtr(10, 15, 1 - 1 / 31))
+    words = f"10 or fewer of 15 has probability {show(chance, 2)} at 97 %"
+    table = agreement(results, untested("several measured recordings needed", words))
     row = table.loc[f"{results.settings['experiment']['accelerometer_sd']:g}"]
     value = f"{100 * row.coverage_95:.0f} % covered, rms z {show(row.z_rms)}"
     remark = f"{row.recordings} recordings, T = {results.samples[-1]}; claimed sd"
@@ -214,9 +202,7 @@ def underestimated(results):
 
 @claim("2021-55")
 def conservative(results):
-    table = agreement(results)
-    if table is None:
-        return untested("several measured recordings needed")
+    table = agreement(results, untested("several measured recordings needed"))
     found, used = table.loc["residual"], results.settings["experiment"]["accelerometer_sd"]
     value = f"{show(found.accelerometer_sd)} m/s^2 in the residual"
     remark = f"with it {100 * found.coverage_95:.0f} % of the 95 % intervals cover, rms z"

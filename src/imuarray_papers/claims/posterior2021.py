@@ -5,17 +5,8 @@ from scipy.special import chdtri
 
 from imuarray.geometry import array_from_config
 from imuarray.posterior.diagnostics import ess
-from imuarray_papers.claims.registry import (
-    CLOCK,
-    by_samples,
-    claim,
-    falls,
-    listed,
-    near,
-    show,
-    untested,
-    verdict,
-)
+from imuarray_papers.claims.numbers import by_samples, falls, listed, near, show
+from imuarray_papers.claims.registry import CLOCK, claim, untested, verdict
 
 
 def _verdicts(results, *names):

@@ -8,6 +8,11 @@ import numpy as np
 import pandas as pd
 
 from imuarray.errors import InputError
+from imuarray_papers.claims.registry import Missing, Outcome, untested
+
+SEVERAL = untested(
+    "several measured recordings with still poses needed, and more than the quick scale"
+)
 
 
 class Results:
@@ -27,12 +32,15 @@ class Results:
         """A CSV file below results/measured, by its path without the ending."""
         return self._cached(f"../measured/{path}", ".csv", pd.read_csv)
 
-    def of_board(self, path: str) -> pd.DataFrame | None:
-        """`measured_table` of what only a board of several recordings has, or None."""
+    def of_board(self, path: str, otherwise: Outcome = SEVERAL) -> pd.DataFrame:
+        """`measured_table` of what only a board of several recordings has.
+
+        Where there is none, the claim has the outcome ``otherwise``.
+        """
         try:
             return self.measured_table(path)
         except InputError:
-            return None
+            raise Missing(otherwise) from None
 
     def replace(self, contents: dict) -> Self:
         """A copy with other ``contents`` by path."""

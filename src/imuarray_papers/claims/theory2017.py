@@ -3,7 +3,8 @@
 import numpy as np
 
 from imuarray.recording.units import GRAVITY
-from imuarray_papers.claims.registry import claim, listed, show, tiny, untested, verdict
+from imuarray_papers.claims.numbers import listed, show, tiny
+from imuarray_papers.claims.registry import claim, untested, verdict
 
 EXACT = "rounding only"
 TINY = 1e-9
