@@ -8,6 +8,7 @@ from imuarray_papers.claims.registry import claim, untested, verdict
 
 SAMPLES = "calibration/position_error_samples"
 MOTION = "calibration/position_error_motion"
+BOUND = "claims/position_bound"
 
 
 def _curve(results, iterations=None):
@@ -48,9 +49,8 @@ def inverse(results, power, remark=""):
     return verdict(slope, error, near(slope, -1, error, 0.05 * power), remark)
 
 
-@claim("2017-44")
-def complete(results):
-    table = results.table(SAMPLES)
+@claim("2017-44", SAMPLES)
+def complete(table):
     rmse = table[table.samples >= 10].pivot(index="iterations", columns="samples", values="rmse_m")
     last = rmse.iloc[-1]
     # what is left to go falls by the same factor in each iteration, as the last two levels show;
@@ -79,9 +79,8 @@ def thousand(results, most, least=0.0, errors=0):
     return verdict(f"{show(row.rmse_m)} m", f"{show(row.rmse_se_m, 2)} m", stands)
 
 
-@claim("2017-05")
-def two_samples(results):
-    table = results.table(SAMPLES)
+@claim("2017-05", SAMPLES)
+def two_samples(table):
     two = table[table.samples == 2].sort_values("iterations")
     first, last = two.iloc[0], two.iloc[-1]
     value, error = ratio(last.rmse_m, last.rmse_se_m, first.rmse_m, first.rmse_se_m)
@@ -93,12 +92,11 @@ def two_samples(results):
     return verdict(value, error, value >= 1 - 3 * error, remark)
 
 
-@claim("2017-06")
-def two_ill_posed(results):
-    ranks = results.table("claims/ranks")
+@claim("2017-06", "claims/ranks", BOUND)
+def two_ill_posed(ranks, bound):
     two = ranks[ranks.samples == 2]
     deficient = int(np.sum(two["rank"] < two.unknowns))
-    bound = results.table("claims/position_bound").iloc[0]
+    bound = bound.iloc[0]
     remark = (
         f"Cramer-Rao bound at N = 2: {show(bound.bound_m)} +- {show(bound.bound_se_m, 2)} m; slow"
         " convergence, not a missing condition, keeps the RMSE up"
@@ -106,9 +104,8 @@ def two_ill_posed(results):
     return verdict(f"{deficient} of {len(two)} arrays deficient", "", deficient > 0, remark)
 
 
-@claim("2017-07")
-def more_iterations(results):
-    table = results.table(SAMPLES)
+@claim("2017-07", SAMPLES)
+def more_iterations(table):
     worst, up = 0.0, 0
     for _, curve in table[table.samples > 2].groupby("samples"):
         curve = curve.sort_values("iterations")
@@ -139,7 +136,7 @@ def _steps_up(results, table, along, across):
     """Over figure 5's grid: what is said of its steps up, how many, where, the bound's own."""
     table = table.sort_values(along)
     up = {level: rises(line.rmse_m, line.rmse_se_m) for level, line in table.groupby(across)}
-    bound = results.table("claims/position_bound")
+    bound = results.table(BOUND)
     grid = bound[bound.samples == results.settings["paper2017"]["fig5_samples"]].iloc[1:]
     lines = grid.sort_values(along).groupby(grid[across].round(3))
     bounds = sum(rises(line.bound_m, line.bound_se_m) for _, line in lines)
@@ -190,9 +187,8 @@ def faster_acceleration(results):
     return verdict(text, "3 errors a step", up == 0, remark)
 
 
-@claim("2017-11")
-def translation(results):
-    table = results.table("calibration/position_error_force")
+@claim("2017-11", "calibration/position_error_force")
+def translation(table):
     weight = table.rmse_se_m**-2.0
     mean = np.sum(weight * table.rmse_m) / weight.sum()
     statistic = float(np.sum(weight * (table.rmse_m - mean) ** 2))
@@ -206,7 +202,7 @@ def translation(results):
 @claim("2017-12")
 def efficient(results):
     last = _curve(results).iloc[-1]
-    bound = results.table("claims/position_bound")
+    bound = results.table(BOUND)
     row = bound[bound.samples == last.samples].iloc[0]
     value, error = ratio(last.rmse_m, last.rmse_se_m, row.bound_m, row.bound_se_m)
     remark = "the paper leaves the bound for the calibration problem open; here it is computed"

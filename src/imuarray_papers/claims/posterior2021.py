@@ -133,9 +133,8 @@ def coverage(results):
     return verdict(f"{inside} of {count}", error, inside >= 26, remark)
 
 
-@claim("2021-38")
-def costs(results):
-    table = results.table("claims/timing")
+@claim("2021-38", "claims/timing")
+def costs(table):
     rows = table[table.what == "transition"].sort_values("samples")
     dearer = rows.seconds.iloc[-1] > 3 * rows.seconds.iloc[0]
     value = f"{'more' if dearer else 'not more'} than 3 times from the first of T = "

@@ -28,10 +28,12 @@ class Outcome(NamedTuple):
 CLAIMS: dict[str, Callable] = {}  # by id, the function of the results that judges it
 
 
-def claim(id: str, **given):
-    """Make the decorated ``test(results, **given) -> Outcome`` judge a claim of the register.
+def claim(id: str, *sources: str, **given):
+    """Make the decorated function, which returns an `Outcome`, judge a claim of the register.
 
-    Raises ValueError for a claim that is judged already, KeyError for one not in the register.
+    It is called with the results, or with what `Results.source` reads of its ``sources``, and with
+    ``given``. Raises ValueError for a claim that is judged already, KeyError for one not in the
+    register.
     """
 
     def register(test):
@@ -39,7 +41,7 @@ def claim(id: str, **given):
             raise ValueError(f"claim {id} is there already")
         if id not in REGISTER:
             raise KeyError(id)
-        CLAIMS[id] = partial(_judged, test, **given)
+        CLAIMS[id] = partial(_judged, test, sources, given)
         return test
 
     return register
@@ -49,9 +51,9 @@ class Missing(Exception):
     """What a claim needs is not here; the argument is the claim's outcome."""
 
 
-def _judged(test, results, **given) -> Outcome:
+def _judged(test, sources, given, results) -> Outcome:
     try:
-        return test(results, **given)
+        return test(*(map(results.source, sources) if sources else [results]), **given)
     except Missing as missing:
         return missing.args[0]
 

@@ -63,6 +63,11 @@ class Results:
         # tables and summaries of one posterior differ only in their ending
         return self._cached(f"{path}.json", "", lambda p: json.loads(p.read_text("utf-8")))
 
+    def source(self, name: str):
+        """A `table` by its path, or an entry of a summary: its `json` path, a colon, its name."""
+        path, _, entry = name.partition(":")
+        return self.json(path)[entry] if entry else self.table(path)
+
     def chains(self, name: str) -> np.ndarray:
         """Draws (chains, n, A - 1, 3) m of chains/``name``, the burn-in left out."""
 
