@@ -7,7 +7,7 @@ from imuarray.pictures.style import BLACK, BLUE, PAGE, VERMILLION, shade
 from imuarray_papers.blind import summary
 from imuarray_papers.blind.inject import CATALOGUE
 from imuarray_papers.blind.summary import CRASH, NOTHING, UNEXPLAINED
-from imuarray_papers.figures.style import Column, drawing, scale_line
+from imuarray_papers.figures.style import drawing, scale_line
 
 GROUPS = {
     "one": "one effect,\n8 σ or more", "clean": "", "gauge": "gauges",
@@ -15,18 +15,6 @@ GROUPS = {
 }  # fmt: skip
 STRUCK = "struck effects, all"
 TEXT = 5.0  # pt, in cells
-CRITERIA = (
-    Column("bar", "set and what is counted", "set and what is counted"),
-    Column("aim", "bar", "bar"),
-    Column("recordings", "recordings", "n"),
-    Column("share", "measured (%)", r"measured (\%)", "{:.1f}", 100.0),
-    Column("low", "95 % limits: from", "from", "{:.1f}", 100.0),
-    Column("high", "to", "to", "{:.1f}", 100.0),
-    Column("verdict", "verdict", "verdict"),
-    Column("sure", "certain at 95 %", "sure"),
-    Column("all_recordings", "all settings: recordings", "n, all"),
-    Column("all_share", "all settings: measured (%)", r"all (\%)", "{:.1f}", 100.0),
-)
 
 
 def words(name: str) -> str:
@@ -137,5 +125,4 @@ def table_blind_bars(rows: dict, settings: dict):
         " crash counts as a miss where a bar is a least share, and has a bar of its own. In a"
         " gauge the array is not determined, and no intervals around one answer can cover.",
     ]
-    caption = "Blind study: what was asked of the diagnosis, and what was measured."
-    return table, CRITERIA, caption, notes
+    return table, notes

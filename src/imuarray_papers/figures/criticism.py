@@ -5,7 +5,7 @@ import pandas as pd
 
 from imuarray.geometry import Array
 from imuarray.pictures.style import BLACK, GREY, PAGE, logarithmic
-from imuarray_papers.figures.style import Column, drawing, marks, panels, rms
+from imuarray_papers.figures.style import columns, drawing, marks, panels, rms
 
 QUANTITIES = {"specific_force": "accelerometers", "angular_rate": "gyroscopes"}
 STEPS = {  # of `measured.causes.STEPS`
@@ -195,15 +195,6 @@ def _draw_between(axes, rows, left_out) -> None:
     draw_gained(axes, rows, said, "between recordings (µm)")
 
 
-CRITICISM = (
-    Column("question", "question", "question"),
-    Column("papers", "papers' model", "papers' model"),
-    Column("extended", "extended model", "extended model"),
-    Column("interval", "± or interval", r"$\pm$ or interval"),
-    Column("source", "from", "from"),
-)
-
-
 def table_criticism(
     summary: pd.DataFrame, noise: pd.DataFrame, diagnosis: tuple, causes: pd.DataFrame,
     predicted: pd.DataFrame, recordings: Array, name: str, group: str,
@@ -242,5 +233,5 @@ def table_criticism(
          f"size, common to all: {1e6 * last.common_size_m:.0f} µm rms; frame: up to"
          f" {turned:.0f} µm for 0.1 degree", several),
     )  # fmt: skip
-    table = pd.DataFrame(rows, columns=[column.name for column in CRITICISM])
-    return table, CRITICISM, "What the papers' model gets wrong on a real board", []
+    table = pd.DataFrame(rows, columns=[column.name for column in columns("criticism")])
+    return table, []

@@ -8,7 +8,7 @@ from imuarray.model.effects import known_effect
 from imuarray.pictures.style import BLACK, PAGE
 from imuarray_papers.blind.study import accuracy, classes
 from imuarray_papers.figures.criticism import draw_gained, estimated, letter, three_digits
-from imuarray_papers.figures.style import Column, drawing, marks, panels, rms
+from imuarray_papers.figures.style import drawing, marks, panels, rms
 
 MODELS = {"base": "papers'", "inflated": "noise inflated", "extended": "extended"}
 
@@ -98,16 +98,6 @@ def _draw_seen(axes, rows) -> None:
     axes.legend(fontsize=6)
 
 
-HIDDEN = (
-    Column("recording", "recording", "recording"), Column("hidden", "hidden", "hidden"),
-    Column("sensors", "in IMU", "in IMU"), Column("named", "named", "named"),
-    Column("named_sensors", "in IMU", "in IMU"), Column("size", "size ± sd", r"size $\pm$ sd"),
-    Column("true_size", "true size", "true size"),
-    Column("gain", "gain, held out (nats)", "gain, held out (nats)"),
-    Column("control", "the same without it", "the same without it"),
-)  # fmt: skip
-
-
 def table_criticism_hidden(diagnoses: list, truths: list, controls: list, names: list):
     """Hidden effects, and what the diagnosis says of them, a row a recording.
 
@@ -137,7 +127,7 @@ def table_criticism_hidden(diagnoses: list, truths: list, controls: list, names:
         " the diagnosis sees the recording alone. Named: what the recording without the effect is"
         " not said to have. Lever arms: with the means that no recording shows."
     )
-    return pd.DataFrame(rows), HIDDEN, "Effects that were hidden, and what was found", [note]
+    return pd.DataFrame(rows), [note]
 
 
 def _sizes(causes: list, hidden: dict) -> tuple[str, str]:

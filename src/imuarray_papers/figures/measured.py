@@ -6,32 +6,7 @@ from scipy.special import ndtr
 
 from imuarray.pictures.noise import KINDS, deviation_lines
 from imuarray.pictures.style import BLACK, PAGE, logarithmic, look
-from imuarray_papers.figures.style import Column, drawing, panels, rms
-
-FIRST_ORDER = (
-    Column("recording", "recording", "recording"),
-    Column("triad", "IMU", "IMU"),
-    Column(
-        "residual_rms", "residual in still poses (mm/s²)", r"residual (mm/s$^2$)", "{:.2f}", 1e3
-    ),
-    Column("left_out", "poses left out", "left out"),
-    Column("force_sd", "accelerometer noise (mm/s²)", r"acc. (mm/s$^2$)", "{:.1f}", 1e3),
-    Column("force_ratio", "/ papers' σa", r"/ $\sigma_a$", "{:.2f}"),
-    Column("rate_sd", "gyroscope noise (deg/s)", "gyro. (deg/s)", "{:.3f}", float(np.degrees(1.0))),
-    Column("rate_ratio", "/ papers' σg", r"/ $\sigma_g$", "{:.2f}"),
-    Column("rate_correlation", "gyroscopes, neighbours' correlation", "corr.", "{:+.2f}"),
-)
-
-AGREEMENT = (
-    Column("samples", "T", "$T$"),
-    Column("assumed", "assumed σa", r"assumed $\sigma_a$"),
-    Column("accelerometer_sd", "its value (m/s²)", r"$\sigma_a$ (m/s$^2$)", "{:.2f}"),
-    Column("claimed_m", "claimed sd (µm)", r"claimed ($\mu$m)", "{:.3g}", 1e6),
-    Column("spread_m", "sd between recordings (µm)", r"between ($\mu$m)", "{:.3g}", 1e6),
-    Column("z_rms", "rms z", "rms $z$", "{:.2f}"),
-    Column("coverage_50", "50 % intervals cover (%)", r"50 \%", "{:.0f}", 100.0),
-    Column("coverage_95", "95 % intervals cover (%)", r"95 \%", "{:.0f}", 100.0),
-)
+from imuarray_papers.figures.style import drawing, panels, rms
 
 
 def table_measured_first_order(residuals: list, noise: list, names: list[str]):
@@ -60,9 +35,7 @@ def table_measured_first_order(residuals: list, noise: list, names: list[str]):
         "Noise: root mean square over the axes, from differences of neighbouring readings in the"
         " still poses, beside the noise the recording declared (the papers')."
     )
-    columns = [column for column in FIRST_ORDER if column.name in table]
-    caption = "First-order calibration from still poses: residual and noise of each IMU"
-    return table, columns, caption, [note]
+    return table, [note]
 
 
 def table_measured_agreement(summary: pd.DataFrame):
@@ -72,8 +45,7 @@ def table_measured_agreement(summary: pd.DataFrame):
         f"{table.recordings.max()} recordings, differences of all pairs in all coordinates. Pairs"
         " share recordings and coordinates share a motion, so the shares have no simple error."
     )
-    caption = "Do recordings of one board agree within their claimed widths?"
-    return table, AGREEMENT, caption, [note]
+    return table, [note]
 
 
 def figure_measured_agreement(summary: pd.DataFrame, pairs: pd.DataFrame, group: str):

@@ -3,15 +3,18 @@
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import yaml
 from matplotlib.figure import Figure
 
 from imuarray.pictures.style import COLUMN, look, new_figure, saved, styled
 from imuarray.provenance import write_bytes, write_csv
 
 DIGITS, ERROR_DIGITS = 5, 3  # significant, of a published number and of its standard error
+TABLES = yaml.safe_load(Path(__file__).with_name("tables.yaml").read_text(encoding="utf-8"))
 
 
 def drawing(draw: Callable, footer=(), width=COLUMN, height=2.8, **given) -> Callable:
@@ -157,12 +160,18 @@ class Column:
         return self.form.format(value * self.factor if self.factor != 1.0 else value)
 
 
-def write_table(table, columns, caption: str, notes, csv, tex, md) -> None:
-    """``table``, `rounded`, as CSV; the ``columns`` of it as LaTeX and Markdown, with notes."""
-    table = rounded(table)
+def columns(name: str) -> list[Column]:
+    """The columns that readers see of the published table ``name``."""
+    return [Column(*given) for given in TABLES[name]["columns"]]
+
+
+def write_table(name: str, table, notes, csv, tex, md) -> None:
+    """``table``, `rounded`, as CSV; those of its `columns` that it has as LaTeX and Markdown."""
+    table, caption = rounded(table), TABLES[name]["caption"]
     write_csv(table, csv)
+    shown = [column for column in columns(name) if column.name in table]
     for path, form in ((tex, latex), (md, markdown)):
-        write_bytes(form(table, columns, caption, notes).encode(), path)
+        write_bytes(form(table, shown, caption, notes).encode(), path)
 
 
 def _cells(table, columns) -> pd.DataFrame:

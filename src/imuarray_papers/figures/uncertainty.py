@@ -5,16 +5,9 @@ import pandas as pd
 from scipy import stats
 
 from imuarray.pictures import style
-from imuarray_papers.figures.style import Column, drawing, marks, points, scale_line
+from imuarray_papers.figures.style import drawing, marks, points, scale_line
 
 ESTIMATORS = ("maximum likelihood", "with the prior")
-RANKS = (
-    Column("case", "motion and geometry", "motion and geometry"),
-    Column("samples", "samples", "$N$"),
-    Column("unknowns", "unknowns", "unknowns"),
-    Column("rank", "rank of the information", "rank"),
-    Column("condition", "condition of what is seen", "condition", "{:.2g}"),
-)
 BINS = 20
 ACROSS = 4  # panels in a line
 SHARES = (0.5, 0.9, 0.95)
@@ -23,23 +16,6 @@ MIXED = 50  # independent draws of a posterior, of 199: fewer are a slow chain
 KEYS = ["setting", "method", "samples"]  # of a histogram, and a row
 WHOLE = ("size", "misfit")  # quantities that hang on all coordinates
 
-COVERAGE = (
-    Column("setting", "setting", "setting"), Column("method", "method", "method"),
-    Column("samples", "T", "$T$"), Column("replicates", "replicates", "replicates"),
-    Column("covered_50", "50 % intervals cover (%)", r"50 \%", "{:.1f}", 100.0),
-    Column("se_50", "±", r"$\pm$", "{:.1f}", 100.0),
-    Column("covered_90", "90 % (%)", r"90 \%", "{:.1f}", 100.0),
-    Column("se_90", "± ", r"$\pm$ ", "{:.1f}", 100.0),
-    Column("covered_95", "95 % (%)", r"95 \%", "{:.1f}", 100.0),
-    Column("se_95", "±  ", r"$\pm$  ", "{:.1f}", 100.0),
-    Column("shift_z", "z of the mean score", r"$z$, shift", "{:+.1f}"),
-    Column("width_z", "z of the mean squared score", r"$z$, width", "{:+.1f}"),
-    Column("size_z", "z, the array's size", r"$z$, size", "{:+.1f}"),
-    Column("misfit_z", "z, misfit of the data", r"$z$, misfit", "{:+.1f}"),
-    Column("p", "p of uniform ranks", "$p$", "{:.2g}"),
-    Column("none", "truths without intervals", "none"), Column("slow", "slow chains", "slow"),
-    Column("apart", "farthest from NUTS", "from NUTS", "{:.2f}"),
-)  # fmt: skip
 COVERAGE_NOTE = (
     "Truths drawn from the prior, motion from its own, which the samplers know, but 'sample', which"
     " is the command as it is: to it the noise and the motion's size are unknown (the paper's limit"
@@ -59,8 +35,7 @@ def table_theory_ranks(rows: pd.DataFrame, settings: dict):
         "Fisher information of the positions r_2 ... r_A with the motion unknown, scaled to a unit"
         " diagonal. A rank below the number of unknowns: the positions cannot be identified."
     )
-    caption = "Which motion and geometry tell the positions."
-    return rows, RANKS, caption, [note, scale_line(settings)]
+    return rows, [note, scale_line(settings)]
 
 
 def figure_theory_efficiency(rows: pd.DataFrame, settings: dict):
@@ -214,9 +189,7 @@ def _mean_z(scores) -> float:
 
 def table_validation_coverage(pit_values: list[pd.DataFrame], settings: dict):
     """Share of intervals that hold the truth, by method and T; ``pit_values``: `studies.sbc`."""
-    table = coverage(pd.concat(pit_values))
-    notes = [COVERAGE_NOTE, scale_line(settings)]
-    return table, COVERAGE, "How often intervals hold the truth.", notes
+    return coverage(pd.concat(pit_values)), [COVERAGE_NOTE, scale_line(settings)]
 
 
 def histogram(values: pd.DataFrame) -> pd.DataFrame:
