@@ -38,15 +38,12 @@ def inverse_root(results):
     return verdict(slope, error, near(slope, -0.5, error, 0.05), remark)
 
 
-ERROR_NOT = "the abstract's word is right for the variance, not for the error; section IV says -1/2"
-
-
-@claim("2017-02", power=1, remark=ERROR_NOT)
+@claim("2017-02", power=1)
 @claim("2017-03", power=2)
-def inverse(results, power, remark=""):
+def inverse(results, power):
     """Verdict on the exponent of the error (power 1), or of its square, the variance."""
     slope, error = (power * part for part in _exponent(results)[:2])
-    return verdict(slope, error, near(slope, -1, error, 0.05 * power), remark)
+    return verdict(slope, error, near(slope, -1, error, 0.05 * power))
 
 
 @claim("2017-44", SAMPLES)
@@ -205,5 +202,4 @@ def efficient(results):
     bound = results.table(BOUND)
     row = bound[bound.samples == last.samples].iloc[0]
     value, error = ratio(last.rmse_m, last.rmse_se_m, row.bound_m, row.bound_se_m)
-    remark = "the paper leaves the bound for the calibration problem open; here it is computed"
-    return verdict(value, error, value + 3 * error < 1.1, remark)
+    return verdict(value, error, value + 3 * error < 1.1)

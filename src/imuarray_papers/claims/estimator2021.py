@@ -28,7 +28,7 @@ def gyroscopes(found):
 @claim("2021-03", DRAWS)
 def naive(found):
     value = f"{show(found['naive'])} of {found['draws']} draws count"
-    return verdict(value, "", found["naive"] < 10, "prior sds as simulated, not even flat")
+    return verdict(value, "", found["naive"] < 10)
 
 
 @claim("2021-04", DRAWS)
@@ -44,8 +44,7 @@ def unbiased(rows):
     value = ", ".join(f"{row['mean_ratio']:.5f}" for row in rows)
     value += f" for N = {listed([row['draws'] for row in rows])}"
     errors = listed([row["mean_se"] for row in rows], 2)
-    remark = "four triads, T = 2; p from plain normal densities, none of the estimator's code"
-    return verdict(value, errors, np.max(np.abs(off)) < 4, remark)
+    return verdict(value, errors, np.max(np.abs(off)) < 4)
 
 
 @claim("2021-06", UNBIASEDNESS)
@@ -84,10 +83,9 @@ def limit(found, column):
 
 @claim("2021-11", "claims/marginalisation:determinant")
 def printed_power(found):
-    remark = "(19) has the root of |M_t|, so (23) enters with power -1/2: print lost the root"
     stands = abs(found["power"] - 1) < 0.01
     value = f"{show(-found['power'])}; misfit {tiny(found['misfit'], 0.01)}"
-    return verdict(value, EXACT, stands, remark)
+    return verdict(value, EXACT, stands)
 
 
 def _printed(results, prefix, remark):
@@ -179,16 +177,14 @@ def grows(results):
         f"N x variance {listed(values)} and N = {listed(chosen)} for T = {listed(results.samples)}"
     )
     stands = bool(np.all(up) and np.all(np.diff(chosen) >= 0) and chosen[-1] > chosen[0])
-    remark = "no values of table I in the text"
-    return verdict(value, listed(values * errors, 2), stands, remark)
+    return verdict(value, listed(values * errors, 2), stands)
 
 
 @claim("2021-20")
 def linear_in_samples(results):
     values, errors = _scaled(results)
     slope, error = power_law(results.samples, values, errors * values)
-    remark = "each T has data of its own, whose information differs: hence the wide criterion"
-    return verdict(slope, error, abs(slope - 1) < 0.3, remark)
+    return verdict(slope, error, abs(slope - 1) < 0.3)
 
 
 @claim("2021-21")

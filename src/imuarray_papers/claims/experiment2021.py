@@ -65,11 +65,8 @@ def attributed(results):
     )
     total = {t: wide[t] / narrow[t] for t in results.samples}
     share = {t: np.log(wide[t] / slow[t]) / np.log(total[t]) for t in results.samples}
-    remark = (
-        "the rest is slower motion: twisting as simulated turns less than section IV-A's motion"
-    )
     value = f"share {by_samples(share, 2)} of {by_samples(total)}"
-    return verdict(value, "none: linearised", min(share.values()) > 0.5, remark)
+    return verdict(value, "none: linearised", min(share.values()) > 0.5)
 
 
 @claim("2021-45")
@@ -108,12 +105,8 @@ def doubled(results):
     factors = [abs((UNDERSIDE_ROTATION @ d - d) @ d) for d in (across, np.array([0.0, 0, 1]), axis)]
     value = f"topside {show(np.abs(top).max())}; underside {listed(factors[:2])}"
     value += f", along the axis {show(factors[2], 2)}"
-    remark = (
-        "an offset along the axis of rotation moves all triads alike and cannot be seen; halving"
-        " the shift therefore gives the in-package position only across that axis"
-    )
     stands = np.allclose(factors[:2], 2) and not top.any()
-    return verdict(value, "none", stands, remark)
+    return verdict(value, "none", stands)
 
 
 @claim("2021-53")
@@ -166,12 +159,8 @@ def _sides(results):
 @claim("2021-49")
 def quadrant(results):
     under, _ = _sides(results)
-    remark = (
-        "with the y axis drawn downwards (-, -) is the upper left quadrant seen from above,"
-        " the upper right one seen from below"
-    )
     value = f"mean ({listed(1e3 * under.mean(axis=0))}) mm"
-    return verdict(value, "", bool(np.all(np.sign(under) == np.sign(under[0]))), remark)
+    return verdict(value, "", bool(np.all(np.sign(under) == np.sign(under[0]))))
 
 
 @claim("2021-63")

@@ -41,7 +41,7 @@ def claim(id: str, *sources: str, **given):
             raise ValueError(f"claim {id} is there already")
         if id not in REGISTER:
             raise KeyError(id)
-        CLAIMS[id] = partial(_judged, test, sources, given)
+        CLAIMS[id] = partial(_judged, id, test, sources, given)
         return test
 
     return register
@@ -51,11 +51,12 @@ class Missing(Exception):
     """What a claim needs is not here; the argument is the claim's outcome."""
 
 
-def _judged(test, sources, given, results) -> Outcome:
+def _judged(id, test, sources, given, results) -> Outcome:
     try:
-        return test(*(map(results.source, sources) if sources else [results]), **given)
+        outcome = test(*(map(results.source, sources) if sources else [results]), **given)
     except Missing as missing:
-        return missing.args[0]
+        outcome = missing.args[0]
+    return outcome._replace(remark=outcome.remark or REGISTER[id].get("remark", ""))
 
 
 def verdict(value: str | float, error: str | float, stands: bool, remark: str = "") -> Outcome:
@@ -65,8 +66,8 @@ def verdict(value: str | float, error: str | float, stands: bool, remark: str = 
     return Outcome(value, error, HOLDS if stands else FAILS, remark)
 
 
-def untested(reason: str, value: str = "", error: str = "") -> Outcome:
-    """The outcome of a claim that needs what is not here."""
+def untested(reason: str = "", value: str = "", error: str = "") -> Outcome:
+    """The outcome of a claim that needs what is not here; the ``reason`` is a remark, too."""
     return Outcome(value, error, UNTESTED, reason)
 
 

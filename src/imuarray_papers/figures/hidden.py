@@ -122,12 +122,7 @@ def table_criticism_hidden(diagnoses: list, truths: list, controls: list, names:
             "gain": f"{mine[0]['heldout_gain_nats']:.3g}" if mine else "",
             "control": f"{len(before)} of its own, {too}" if before else "nothing",
         })  # fmt: skip
-    note = (
-        "Effect, IMU and size are drawn from the seed by code that shares nothing with the model;"
-        " the diagnosis sees the recording alone. Named: what the recording without the effect is"
-        " not said to have. Lever arms: with the means that no recording shows."
-    )
-    return pd.DataFrame(rows), [note]
+    return pd.DataFrame(rows), []
 
 
 def _sizes(causes: list, hidden: dict) -> tuple[str, str]:

@@ -30,12 +30,7 @@ def table_measured_first_order(residuals: list, noise: list, names: list[str]):
                 entry |= {f"{short}_sd": sd, f"{short}_ratio": sd / part.declared.iloc[0]}
                 entry[f"{short}_correlation"] = part.correlation.mean()
             rows.append(entry)
-    table = pd.DataFrame(rows)
-    note = (
-        "Noise: root mean square over the axes, from differences of neighbouring readings in the"
-        " still poses, beside the noise the recording declared (the papers')."
-    )
-    return table, [note]
+    return pd.DataFrame(rows), []
 
 
 def table_measured_agreement(summary: pd.DataFrame):

@@ -166,8 +166,12 @@ def columns(name: str) -> list[Column]:
 
 
 def write_table(name: str, table, notes, csv, tex, md) -> None:
-    """``table``, `rounded`, as CSV; those of its `columns` that it has as LaTeX and Markdown."""
+    """``table``, `rounded`, as CSV; those of its `columns` that it has as LaTeX and Markdown.
+
+    ``notes`` follow those of tables.yaml.
+    """
     table, caption = rounded(table), TABLES[name]["caption"]
+    notes = [*TABLES[name].get("notes", ()), *notes]
     write_csv(table, csv)
     shown = [column for column in columns(name) if column.name in table]
     for path, form in ((tex, latex), (md, markdown)):

@@ -16,26 +16,10 @@ MIXED = 50  # independent draws of a posterior, of 199: fewer are a slow chain
 KEYS = ["setting", "method", "samples"]  # of a histogram, and a row
 WHOLE = ("size", "misfit")  # quantities that hang on all coordinates
 
-COVERAGE_NOTE = (
-    "Truths drawn from the prior, motion from its own, which the samplers know, but 'sample', which"
-    " is the command as it is: to it the noise and the motion's size are unknown (the paper's limit"
-    " of a flat motion prior cannot be simulated; docs/findings.md says what it does to the array's"
-    " size). ±: standard errors over replicates."
-    " Scores: normal quantiles of the truth's PIT value; a mean square above 1 (z > 0) means widths"
-    " too small."
-    " p: Kolmogorov and Smirnov's, the smallest of all quantities times their number."
-    " Slow: fewer than 50 of 199 kept draws are worth an independent one. Farthest from NUTS: the"
-    " largest rms difference between both methods' PIT values of one truth; 0.05 is chance."
-)
-
 
 def table_theory_ranks(rows: pd.DataFrame, settings: dict):
     """Rank of the information over N, motion and geometry; ``rows``: `studies.bound.ranks`."""
-    note = (
-        "Fisher information of the positions r_2 ... r_A with the motion unknown, scaled to a unit"
-        " diagonal. A rank below the number of unknowns: the positions cannot be identified."
-    )
-    return rows, [note, scale_line(settings)]
+    return rows, [scale_line(settings)]
 
 
 def figure_theory_efficiency(rows: pd.DataFrame, settings: dict):
@@ -189,7 +173,7 @@ def _mean_z(scores) -> float:
 
 def table_validation_coverage(pit_values: list[pd.DataFrame], settings: dict):
     """Share of intervals that hold the truth, by method and T; ``pit_values``: `studies.sbc`."""
-    return coverage(pd.concat(pit_values)), [COVERAGE_NOTE, scale_line(settings)]
+    return coverage(pd.concat(pit_values)), [scale_line(settings)]
 
 
 def histogram(values: pd.DataFrame) -> pd.DataFrame:
