@@ -76,8 +76,8 @@ def test_a_board_predicts_another_recording():
     by = table.set_index("model")
     assert by.over_inflated.board > 5 and abs(by.over_board.own) < 0.3
     assert (by.samples == len(readings.time)).all() and by.converged.all()
-    rows, notes = table_left_out([table], ["one"], "board")
-    assert rows.board[0] == by.over_inflated.board and "board" in notes[0]
+    rows, words = table_left_out([table], ["one"], "board")
+    assert rows.board[0] == by.over_inflated.board and words == {"group": "board"}
     assert {column.name for column in style.columns("left_out")} == set(rows)
 
 

@@ -47,8 +47,8 @@ def test_the_right_model_predicts_what_is_withheld(withheld, found):
     assert np.all(np.abs(board.within_95 - 0.95) < 0.05)
     figure = figure_past_rail(300, ["a footer"])(table)
     assert all(len(axes.lines) == 7 for axes in figure.axes)
-    rows, notes = table_past_rail([table, table], ["a", "b"], "board")
-    assert len(rows) == 4 and "without the withheld readings" in notes[0]
+    rows, words = table_past_rail([table, table], ["a", "b"], "board")
+    assert len(rows) == 4 and words == {"group": "board"}
 
 
 def test_effects_beside_a_calibration_s_model_are_refused(withheld, found, tmp_path, capsys):

@@ -51,12 +51,7 @@ def _past_rail(figure, table, rail_dps):
 
 def table_causes(summary: pd.DataFrame, group: str):
     """Gain of each cause; ``summary``: `measured.causes.repeated` of the board ``group``."""
-    note = (
-        f"{summary.recordings.max()} recordings of board {group}; differences of all pairs, all"
-        " coordinates. Nats: what is new in a row gains on held-out time over the row that it"
-        " extends, median over recordings."
-    )
-    return summary, [note]
+    return summary, {"recordings": summary.recordings.max(), "group": group}
 
 
 def table_experiment(located: list, names: list[str], summary: pd.DataFrame, group: str):
@@ -81,14 +76,8 @@ def table_experiment(located: list, names: list[str], summary: pd.DataFrame, gro
         found = agreement(pairwise(table), table)
         rows.append(pd.DataFrame([found | {"samples": int(each), "model": "sensors"}]))
     table = pd.concat(rows, ignore_index=True).sort_values("samples", kind="stable")
-    note = (
-        f"{table.recordings.max()} recordings of board {group}; sds are rms over coordinates,"
-        " shares and z of the differences of all pairs. Sensors: maps, delays and lever arms from"
-        " the board's other recordings, biases and clocks from the whole recording, positions from"
-        " T samples."
-    )
-    table = table[[column.name for column in columns("experiment")]]
-    return table, [note]
+    words = {"recordings": table.recordings.max(), "group": group}
+    return table[[column.name for column in columns("experiment")]], words
 
 
 def table_past_rail(tables: list[pd.DataFrame], names: list[str], group: str):
@@ -97,11 +86,7 @@ def table_past_rail(tables: list[pd.DataFrame], names: list[str], group: str):
         table[table.model == "board"].assign(recording=name)
         for name, table in zip(names, tables, strict=True)
     ]
-    note = (
-        f"Board {group}: its parameters from the other recordings; biases, clocks, noise and motion"
-        " fitted to the recording without the withheld readings. Readings: of all gyroscopes."
-    )
-    return pd.concat(parts), [note]
+    return pd.concat(parts), {"group": group}
 
 
 def table_left_out(tables: list[pd.DataFrame], names: list[str], group: str):
@@ -115,13 +100,7 @@ def table_left_out(tables: list[pd.DataFrame], names: list[str], group: str):
             "board": by.over_inflated.board, "board_error": by.over_inflated_error.board,
             "beyond": by.over_board.own, "beyond_error": by.over_board_error.own,
         })  # fmt: skip
-    note = (
-        f"Board {group}: its parameters from the other recordings; biases, clocks, noise and motion"
-        " fitted to the recording. Nats a sample on held-out blocks of time over the papers' model"
-        " with normal noise as large as the residual, positions fitted to the recording; ± standard"
-        " error between blocks. Last: what a fit of all parameters to the recording has beyond."
-    )
-    return pd.DataFrame(rows), [note]
+    return pd.DataFrame(rows), {"group": group}
 
 
 def positions_agreement(documents: dict[str, dict]) -> pd.DataFrame:

@@ -234,4 +234,4 @@ def table_criticism(
          f" {turned:.0f} µm for 0.1 degree", several),
     )  # fmt: skip
     table = pd.DataFrame(rows, columns=[column.name for column in columns("criticism")])
-    return table, []
+    return table, {}

@@ -122,7 +122,7 @@ def table_criticism_hidden(diagnoses: list, truths: list, controls: list, names:
             "gain": f"{mine[0]['heldout_gain_nats']:.3g}" if mine else "",
             "control": f"{len(before)} of its own, {too}" if before else "nothing",
         })  # fmt: skip
-    return pd.DataFrame(rows), []
+    return pd.DataFrame(rows), {}
 
 
 def _sizes(causes: list, hidden: dict) -> tuple[str, str]:

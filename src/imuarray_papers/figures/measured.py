@@ -30,17 +30,12 @@ def table_measured_first_order(residuals: list, noise: list, names: list[str]):
                 entry |= {f"{short}_sd": sd, f"{short}_ratio": sd / part.declared.iloc[0]}
                 entry[f"{short}_correlation"] = part.correlation.mean()
             rows.append(entry)
-    return pd.DataFrame(rows), []
+    return pd.DataFrame(rows), {}
 
 
 def table_measured_agreement(summary: pd.DataFrame):
     """Coverage and z-scores between recordings of a board; ``summary``: `measured.agreement`."""
-    table = summary.astype({"assumed": str})
-    note = (
-        f"{table.recordings.max()} recordings, differences of all pairs in all coordinates. Pairs"
-        " share recordings and coordinates share a motion, so the shares have no simple error."
-    )
-    return table, [note]
+    return summary.astype({"assumed": str}), {"recordings": summary.recordings.max()}
 
 
 def figure_measured_agreement(summary: pd.DataFrame, pairs: pd.DataFrame, group: str):

@@ -4,8 +4,6 @@ import pandas as pd
 
 from imuarray_papers.figures.style import columns, scale_line, unfinished
 
-NOT_IN_TEXT = "The paper's values are not in the extracted text; these are ours."
-
 
 def table_2021_table1(tunings: list[dict], verdicts: list[dict], settings: dict):
     """Tuning parameters and what came of them, one row for each T.
@@ -19,9 +17,7 @@ def table_2021_table1(tunings: list[dict], verdicts: list[dict], settings: dict)
         row = {f"acceptance_{number}": share for number, share in shares}
         rows.append(row | verdict | tuning)
     table = pd.DataFrame(rows)[[column.name for column in columns("2021_table1")] + ["converged"]]
-    threshold = settings["paper2021"]["rhat_threshold"]
-    notes = [NOT_IN_TEXT, *unfinished(table, threshold), scale_line(settings) + "."]
-    return table, notes
+    return table, _chains(table, settings)
 
 
 def table_2021_table2(experiment: list, simulation: list, ideal: list, settings: dict):
@@ -51,9 +47,10 @@ def table_2021_table2(experiment: list, simulation: list, ideal: list, settings:
     table = pd.DataFrame(rows)
     counts = table.groupby("source", sort=False).accelerometers.first()
     sizes = ", ".join(f"{count} ({name})" for name, count in counts.items())
-    notes = [
-        f"Experiment: recording {settings['experiment']['recording']}. {NOT_IN_TEXT}",
-        f"IMUs: {sizes}.",
-        *unfinished(table, settings["paper2021"]["rhat_threshold"]), scale_line(settings) + ".",
-    ]  # fmt: skip
-    return table, notes
+    words = {"recording": settings["experiment"]["recording"], "sizes": sizes}
+    return table, words | _chains(table, settings)
+
+
+def _chains(table, settings: dict) -> dict:
+    threshold = settings["paper2021"]["rhat_threshold"]
+    return {"unfinished": unfinished(table, threshold), "scale": scale_line(settings)}

@@ -34,9 +34,9 @@ def publish(snakemake) -> None:
     """Draw a figure (PDF, PNG, CSV) or make a table (CSV, LaTeX, Markdown) and write it.
 
     The rule's parameter ``by`` names a function of the package, such as "figures.measured.allan".
-    It gives (drawing function, table), or (table, notes) if its name begins with "table"; the rest
-    of the name is its place in tables.yaml. It is given what it asks for by name: the rule's input
-    files, read by `READERS`, its parameters and its wildcards.
+    It gives (drawing function, table), or (table, words of its notes) if its name begins with
+    "table"; the rest of the name is its place in tables.yaml. It is given what it asks for by name:
+    the rule's input files, read by `READERS`, its parameters and its wildcards.
     """
     module, _, name = snakemake.params.by.rpartition(".")
     function = getattr(import_module(f"imuarray_papers.{module}"), name)

@@ -136,11 +136,11 @@ def chain_lines(verdicts: dict[int, dict]) -> list[str]:
     return [*lines, last]
 
 
-def unfinished(table, threshold: float) -> list[str]:
-    """A note on the rows whose chains fail the criterion; none if there are no such rows."""
+def unfinished(table, threshold: float) -> str:
+    """A note on the rows whose chains fail the criterion; empty if there are no such rows."""
     failed = (~table.converged).sum()
     said = f"R-hat is not below {threshold:g} in {failed} of {len(table)} rows: preliminary."
-    return [said] if failed else []
+    return said if failed else ""
 
 
 @dataclass(frozen=True)
@@ -165,17 +165,22 @@ def columns(name: str) -> list[Column]:
     return [Column(*given) for given in TABLES[name]["columns"]]
 
 
-def write_table(name: str, table, notes, csv, tex, md) -> None:
+def notes(name: str, words: dict) -> list[str]:
+    """The notes on the published table ``name``; none that is empty."""
+    filled = (note.format(**words) for note in TABLES[name].get("notes", ()))
+    return [note for note in filled if note]
+
+
+def write_table(name: str, table, words: dict, csv, tex, md) -> None:
     """``table``, `rounded`, as CSV; those of its `columns` that it has as LaTeX and Markdown.
 
-    ``notes`` follow those of tables.yaml.
+    ``words`` of its `notes`.
     """
-    table, caption = rounded(table), TABLES[name]["caption"]
-    notes = [*TABLES[name].get("notes", ()), *notes]
+    table, caption, below = rounded(table), TABLES[name]["caption"], notes(name, words)
     write_csv(table, csv)
     shown = [column for column in columns(name) if column.name in table]
     for path, form in ((tex, latex), (md, markdown)):
-        write_bytes(form(table, shown, caption, notes).encode(), path)
+        write_bytes(form(table, shown, caption, below).encode(), path)
 
 
 def _cells(table, columns) -> pd.DataFrame:

@@ -19,7 +19,7 @@ WHOLE = ("size", "misfit")  # quantities that hang on all coordinates
 
 def table_theory_ranks(rows: pd.DataFrame, settings: dict):
     """Rank of the information over N, motion and geometry; ``rows``: `studies.bound.ranks`."""
-    return rows, [scale_line(settings)]
+    return rows, {"scale": scale_line(settings)}
 
 
 def figure_theory_efficiency(rows: pd.DataFrame, settings: dict):
@@ -173,7 +173,7 @@ def _mean_z(scores) -> float:
 
 def table_validation_coverage(pit_values: list[pd.DataFrame], settings: dict):
     """Share of intervals that hold the truth, by method and T; ``pit_values``: `studies.sbc`."""
-    return coverage(pd.concat(pit_values)), [scale_line(settings)]
+    return coverage(pd.concat(pit_values)), {"scale": scale_line(settings)}
 
 
 def histogram(values: pd.DataFrame) -> pd.DataFrame:
