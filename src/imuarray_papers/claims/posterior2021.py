@@ -153,7 +153,7 @@ def size_offset(results, name) -> tuple[float, float, float]:
     """
     nominal = array_from_config(results.settings["array"]).relative
     nominal = nominal - nominal.mean(axis=0)
-    table = results.posterior(name)[0]
+    table = results.posterior(name)
     truth = table.truth_m.to_numpy().reshape(-1, 3)
     # the reference triad is at zero in truth and draws, so its term vanishes
     scales = np.einsum("cnka,ka->cn", results.chains(name) - truth, nominal[1:])

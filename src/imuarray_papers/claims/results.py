@@ -95,14 +95,10 @@ class Results:
         """By T, the summaries of ``path``, in which {} stands for T."""
         return {t: self.json(path.format(t)) for t in self.samples}
 
-    def posterior(self, name: str) -> tuple[pd.DataFrame, str]:
-        """Truth, mean and sd (m) per coordinate, and where they come from.
-
-        The chains where they have converged, else the linearised posterior.
-        """
-        if self.json(f"posterior/{name}")["converged"]:
-            return self.table(f"posterior/{name}"), "chains"
-        return self.linearised(name), "linearised"
+    def posterior(self, name: str) -> pd.DataFrame:
+        """Truth, mean and sd (m) per coordinate: of converged chains, else linearised."""
+        converged = self.json(f"posterior/{name}")["converged"]
+        return self.table(f"posterior/{name}") if converged else self.linearised(name)
 
     def linearised(self, name: str) -> pd.DataFrame:
         """The linearised posterior called ``name``, as in `posterior`."""
@@ -111,7 +107,7 @@ class Results:
 
     def posteriors(self, prefix: str = "") -> dict[int, pd.DataFrame]:
         """By T, what `posterior` gives of ``prefix`` T..."""
-        return {t: self.posterior(f"{prefix}T{t}")[0] for t in self.samples}
+        return {t: self.posterior(f"{prefix}T{t}") for t in self.samples}
 
     def unconverged(self, name: str) -> str:
         """A remark on chains that have not converged."""

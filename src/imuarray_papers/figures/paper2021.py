@@ -259,23 +259,20 @@ def densities(posteriors: dict[int, np.ndarray], prior, truth) -> pd.DataFrame:
 
 
 def _posteriors(axes, rows):
-    """Prior, posteriors and truth of one coordinate."""
-    names = [samples for samples in sorted(rows.samples.unique()) if samples > 0]
-    _density(axes, rows[rows.samples == 0], {"color": SKY, "linestyle": ":"}, "prior")
-    for index, samples in enumerate(names):
-        _density(axes, rows[rows.samples == samples], look(index, "linestyle"), f"$T = {samples}$")
+    """Prior, posteriors and truth of one coordinate.
+
+    The first chain is full and the others are dashed; the peak of all chains is at 1.
+    """
+    for index, (samples, some) in enumerate(rows.groupby("samples"), start=-1):
+        label = f"$T = {samples}$" if samples else "prior"
+        style = look(index, "linestyle") if samples else {"color": SKY, "linestyle": ":"}
+        for number, (_, one) in enumerate(some.groupby("chain")):
+            axes.plot(
+                one.deviation_um, one.density_per_um / some.density_per_um.max(),
+                label=label if number == 0 else None, markevery=(8 * number, 16), markersize=3,
+                markerfacecolor="none", **({"linestyle": _dashes(number)} | style),
+            )  # fmt: skip
     axes.axvline(0, **TRUTH)
-
-
-def _density(axes, rows, style, label):
-    """The chains of one posterior, the first one full and the others dashed; common peak 1."""
-    peak = rows.density_per_um.max()
-    for number, (_, one) in enumerate(rows.groupby("chain")):
-        axes.plot(
-            one.deviation_um, one.density_per_um / peak, label=label if number == 0 else None,
-            markevery=(8 * number, 16), markersize=3, markerfacecolor="none",
-            **({"linestyle": _dashes(number)} | style),
-        )  # fmt: skip
 
 
 def _dashes(number: int):

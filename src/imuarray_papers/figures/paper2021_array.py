@@ -28,17 +28,13 @@ def layout_table(array: Array) -> pd.DataFrame:
     under = height < (height.min() + height.max()) / 2 - 1e-9
     turn = np.where(under[:, None, None], UNDERSIDE_ROTATION, np.eye(3))
     marker = turn @ (MARKER * np.array(array.package))
-    table = pd.DataFrame({"accelerometer": array.labels})
-    table["side"] = np.where(under, "underside", "topside")
-    for name, values in (
-        ("", array.positions), ("relative_", array.relative),
-        ("marker_", array.positions + marker),
-    ):  # fmt: skip
-        for axis, column in zip("xyz", values.T, strict=True):
-            table[f"{name}{axis}_m"] = column
-    for axis, length in zip(("length", "width", "height"), array.package, strict=True):
-        table[f"package_{axis}_m"] = length
-    return table
+    places = np.hstack([array.positions, array.relative, array.positions + marker])
+    names = [f"{part}{axis}_m" for part in ("", "relative_", "marker_") for axis in "xyz"]
+    table = pd.DataFrame(places, columns=names)
+    table.insert(0, "accelerometer", array.labels)
+    table.insert(1, "side", np.where(under, "underside", "topside"))
+    sizes = ("package_length_m", "package_width_m", "package_height_m")
+    return table.assign(**dict(zip(sizes, array.package, strict=True)))
 
 
 def figure_2021_fig1(settings: dict):
