@@ -9,6 +9,8 @@ from imuarray_papers.claims.registry import claim, untested, verdict
 SAMPLES = "calibration/position_error_samples"
 MOTION = "calibration/position_error_motion"
 BOUND = "claims/position_bound"
+RATE, ACCELERATION = "angular_rate_dps", "angular_acceleration_dps2"
+UNITS = {RATE: "deg/s", ACCELERATION: "deg/s^2"}
 
 
 def _curve(results, iterations=None):
@@ -129,8 +131,8 @@ def more_samples(results):
     return verdict(value, f"{listed(curve.rmse_se_m, 2)} m", up == 0 and falls, remark)
 
 
-def _steps_up(results, table, along, across):
-    """Over figure 5's grid: what is said of its steps up, how many, where, the bound's own."""
+def _steps_up(results, table, along, across, remark):
+    """Verdict on figure 5's steps up; the ``remark`` gets the number of the bound's own."""
     table = table.sort_values(along)
     up = {level: rises(line.rmse_m, line.rmse_se_m) for level, line in table.groupby(across)}
     bound = results.table(BOUND)
@@ -139,22 +141,20 @@ def _steps_up(results, table, along, across):
     bounds = sum(rises(line.bound_m, line.bound_se_m) for _, line in lines)
     count = sum(up.values())
     text = f"{count} of {len(table) - table[across].nunique()} steps go up"
-    return text, count, ", ".join(show(level, 6) for level in up if up[level]), bounds
+    where = ", ".join(show(level, 6) for level in up if up[level])
+    where = f"at {where} {UNITS[across]}; " if where else ""
+    return verdict(text, "3 errors a step", count == 0, where + remark.format(bounds))
 
 
 @claim("2017-09")
 def faster_rotation(results):
-    names = ("angular_rate_dps", "angular_acceleration_dps2")
-    text, up, where, bounds = _steps_up(results, results.table(MOTION), *names)
-    remark = f"at {where} deg/s^2; " if where else ""
-    remark += f"the Cramer-Rao bound itself goes up in {bounds} steps"
-    return verdict(text, "3 errors a step", up == 0, remark)
+    remark = "the Cramer-Rao bound itself goes up in {} steps"
+    return _steps_up(results, results.table(MOTION), RATE, ACCELERATION, remark)
 
 
 def _beyond(table, limit) -> str:
     """A remark on our rows of figure 5 at accelerations above ``limit`` (deg/s^2)."""
-    levels = {a: row.set_index("angular_rate_dps")
-              for a, row in table.groupby("angular_acceleration_dps2")}  # fmt: skip
+    levels = {a: row.set_index(RATE) for a, row in table.groupby(ACCELERATION)}
     text, near = "", levels[max(a for a in levels if a <= limit)]
     for level in (a for a in levels if a > limit):
         row = levels[level]
@@ -173,15 +173,12 @@ def _beyond(table, limit) -> str:
 
 @claim("2017-10")
 def faster_acceleration(results):
-    names = ("angular_acceleration_dps2", "angular_rate_dps")
     whole = results.table(MOTION)
     hand = results.settings["paper2021"]["angular_acceleration_sd_dps2"]
     table = whole[whole.angular_acceleration_dps2 <= hand]
-    text, up, where, bounds = _steps_up(results, table, *names)
-    remark = f"at {where} deg/s; " if where else ""
-    remark += "figure 5's axes are not in the text; the Cramer-Rao bound goes up in"
-    remark += f" {bounds} steps of our whole grid{_beyond(whole, hand)}"
-    return verdict(text, "3 errors a step", up == 0, remark)
+    remark = "figure 5's axes are not in the text; the Cramer-Rao bound goes up in {} steps of our"
+    remark += f" whole grid{_beyond(whole, hand)}"
+    return _steps_up(results, table, ACCELERATION, RATE, remark)
 
 
 @claim("2017-11", "calibration/position_error_force")

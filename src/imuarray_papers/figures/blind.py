@@ -58,10 +58,10 @@ def figure_blind_confusion(rows: dict, settings: dict):
         " with several names is in several columns; unexplained: the flag, whatever is named.",
     )
     lines = confusion_rows(found)[["kind", "truth"]].drop_duplicates()
-    return drawing(_confusion, [footer], PAGE, 1.3 + 0.165 * len(lines)), found
+    return drawing(_draw_confusion, [footer], PAGE, 1.3 + 0.165 * len(lines)), found
 
 
-def _confusion(figure, found):
+def _draw_confusion(figure, found):
     table, axes = confusion_rows(found), figure.subplots()
     columns = names_of(table)
     lines = list(dict.fromkeys(zip(table.kind, table.truth, strict=True)))

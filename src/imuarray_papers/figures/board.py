@@ -22,10 +22,10 @@ SERIES = {
 
 def figure_past_rail(rail_dps: float, footer=()):
     """Median error and RMSE of the withheld readings over the angular rate; log-log."""
-    return drawing(_past_rail, footer, PAGE, rail_dps=rail_dps)
+    return drawing(_draw_past_rail, footer, PAGE, rail_dps=rail_dps)
 
 
-def _past_rail(figure, table, rail_dps):
+def _draw_past_rail(figure, table, rail_dps):
     panels = figure.subplots(1, 2, sharey=True)
     # a normal error of sd 1 has the median 0.674
     columns = (
