@@ -145,7 +145,7 @@ def no_rotation(found):
 
 def _low(results):
     """By T, the sweep where the variance is below 1: there it goes with 1/N."""
-    return {t: sweep[sweep.variance < 1] for t, sweep in results.each_table(SWEEP).items()}
+    return {t: sweep[sweep.variance < 1] for t, sweep in results.source(SWEEP).items()}
 
 
 @claim("2021-18")
@@ -171,7 +171,7 @@ def _scaled(results):
 @claim("2021-19")
 def grows(results):
     values, errors = _scaled(results)
-    chosen = [tuned["draws"] for tuned in results.each_json("tuning/T{}").values()]
+    chosen = [*results.source("tuning/T{}:draws").values()]
     up = np.diff(np.log(values)) > 3 * np.hypot(errors[1:], errors[:-1])
     value = (
         f"N x variance {listed(values)} and N = {listed(chosen)} for T = {listed(results.samples)}"
@@ -187,16 +187,14 @@ def linear_in_samples(results):
     return verdict(slope, error, abs(slope - 1) < 0.3)
 
 
-@claim("2021-21")
-def target_variance(results):
-    found = results.each_json("tuning/T{}")
-    pairs = [(tuned["variance"], tuned["draws"]) for tuned in found.values()]
+@claim("2021-21", "tuning/T{}:variance", "tuning/T{}:draws", SWEEP)
+def target_variance(variance, draws, sweeps):
+    pairs = zip(variance.values(), draws.values(), strict=True)
     stands = all(v <= 0.12 and (n == 1 or v * n / (n - 1) > 0.08) for v, n in pairs)
-    value = by_samples({t: tuned["variance"] for t, tuned in found.items()})
-    value += f" with N = {listed([n for _, n in pairs])}"
-    count = int(results.table(SWEEP.format(results.samples[0])).realisations.iloc[0])
+    value = f"{by_samples(variance)} with N = {listed(draws.values())}"
+    count = int(next(iter(sweeps.values())).realisations.iloc[0])
     remark = ""
-    if any(n == 1 for _, n in pairs):
+    if 1 in draws.values():
         remark = "the smallest N there is, 1, already does better for few samples"
     return verdict(value, f"{100 * np.sqrt(2 / (count - 1)):.0f} %", stands, remark)
 
@@ -204,7 +202,7 @@ def target_variance(results):
 @claim("2021-22")
 def acceptance(results):
     low, high = results.settings["paper2021"]["acceptance_range"]
-    found = {t: v["acceptance"] for t, v in results.each_json("posterior/T{}").items()}
+    found = results.source("posterior/T{}:acceptance")
     stands = all(low <= rate <= high for rates in found.values() for rate in rates)
     return verdict(by_samples(found), "over the whole run, burn-in included", stands)
 
@@ -224,10 +222,10 @@ def three_point_three(found):
     return verdict(f"{show(variance)}, {show(acceptance)}", "none", stands)
 
 
-@claim("2021-25")
-def trade_off(results):
+@claim("2021-25", "tuning/acceptance_T{}")
+def trade_off(sweeps):
     ends, up, largest = {}, 0, 0.0
-    for samples, sweep in results.each_table("tuning/acceptance_T{}").items():
+    for samples, sweep in sweeps.items():
         sweep = sweep.sort_values("step_length_m")
         error = np.maximum(sweep.acceptance_se, 1 / sweep.transitions)
         up += rises(sweep.acceptance, error)

@@ -202,8 +202,8 @@ def conservative(results):
 @claim("2021-57")
 def localised(results):
     limit = 2 * results.settings["paper2021"]["variance_target"]
-    verdicts = results.each_json(f"posterior/{results.measured}_T{{}}")
-    found = {t: v["variance_at_most_draws"] for t, v in verdicts.items()}
-    most = max(v["most_draws"] for v in verdicts.values())
-    remark = f"N = {most}; the chains here draw omega around the integrand's mode where it fails"
+    entries = ("variance_at_most_draws", "most_draws")
+    found, most = (results.source(f"posterior/{results.measured}_T{{}}:{x}") for x in entries)
+    remark = f"N = {max(most.values())}; the chains here draw omega around the integrand's mode"
+    remark += " where it fails"
     return verdict(by_samples(found), "", all(v <= limit for v in found.values()), remark)

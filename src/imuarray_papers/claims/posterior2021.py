@@ -8,16 +8,13 @@ from imuarray.posterior.diagnostics import ess
 from imuarray_papers.claims.numbers import by_samples, falls, listed, near, show
 from imuarray_papers.claims.registry import CLOCK, claim, untested, verdict
 
-
-def _verdicts(results, *names):
-    """By T, the entries ``names`` of the chains' verdicts: a dict for each."""
-    found = results.each_json("posterior/T{}")
-    return [{t: verdict[name] for t, verdict in found.items()} for name in names]
+ESS, Z, STEPS, CHAINS = (
+    f"posterior/T{{}}:{entry}" for entry in ("ess_min", "split_z_max", "steps", "chains")
+)
 
 
-@claim("2021-27")
-def chains_agree(results):
-    rhat, ess, z, steps = _verdicts(results, "rhat_max", "ess_min", "split_z_max", "steps")
+@claim("2021-27", "posterior/T{}:rhat_max", ESS, Z, STEPS)
+def chains_agree(rhat, ess, z, steps):
     remark = (
         f"smallest effective sizes {by_samples(ess)}; largest |z| of the chains' means"
         f" {by_samples(z)}; steps {by_samples(steps, 7)}"
@@ -25,21 +22,20 @@ def chains_agree(results):
     return verdict(by_samples(rhat, 4), "", max(rhat.values()) < 1.05, remark)
 
 
-@claim("2021-28")
-def means_agree(results):
-    z, ess = _verdicts(results, "split_z_max", "ess_min")
+@claim("2021-28", Z, ESS)
+def means_agree(z, ess):
     stands = max(z.values()) < 4.5 and min(ess.values()) > 100
     return verdict(by_samples(z), "1 by construction", stands)
 
 
 @claim("2021-29")
 def burn_in(results):
-    tables = results.each_table("posterior/burn_in_T{}")
+    tables = results.source("posterior/burn_in_T{}")
     # the first candidate is none, the second the entry
     best = {t: table.rhat_max[table.burn_in > 0].min() for t, table in tables.items()}
-    (steps,) = _verdicts(results, "burn_in_steps")
     stands = max(best.values()) < results.settings["paper2021"]["rhat_threshold"]
-    remark = f"burn-in chosen: {by_samples(steps, 7)} steps"
+    steps = by_samples(results.source("posterior/T{}:burn_in_steps"), 7)
+    remark = f"burn-in chosen: {steps} steps"
     return verdict(by_samples(best, 4), "", stands, remark)
 
 
@@ -85,8 +81,8 @@ def honest(results):
 
 @claim("2021-34")
 def robust(results):
-    prior, (good,) = results.settings["paper2021"]["prior_sd"], _verdicts(results, "converged")
-    tables = results.each_table("posterior/T{}")
+    good, tables = (results.source(f"posterior/T{{}}{end}") for end in (":converged", ""))
+    prior = results.settings["paper2021"]["prior_sd"]
     ratios = {t: table.sd_m.max() / prior for t, table in tables.items()}
     stands = all(good.values()) and max(ratios.values()) < 0.1
     value = f"{sum(good.values())} of {len(good)} converged"
@@ -94,9 +90,8 @@ def robust(results):
     return verdict(value, "", stands)
 
 
-@claim("2021-35")
-def efficient(results):
-    ess, steps, chains = _verdicts(results, "ess_min", "steps", "chains")
+@claim("2021-35", ESS, STEPS, CHAINS)
+def efficient(ess, steps, chains):
     rate = {t: 1000 * ess[t] / (steps[t] * chains[t]) for t in ess}
     return untested(value=f"smallest effective size a 1000 steps {by_samples(rate)}")
 
@@ -138,9 +133,8 @@ def costs(table):
     return verdict(f"{value}{listed(rows.samples)} to the last", "", dearer, CLOCK)
 
 
-@claim("2021-39")
-def run_time(results):
-    taken, chains = _verdicts(results, "steps", "chains")
+@claim("2021-39", STEPS, CHAINS)
+def run_time(taken, chains):
     steps = {t: taken[t] * chains[t] for t in taken}
     return untested(value=f"{by_samples(steps, 7)} steps")
 

@@ -64,7 +64,12 @@ class Results:
         return self._cached(f"{path}.json", "", lambda p: json.loads(p.read_text("utf-8")))
 
     def source(self, name: str):
-        """A `table` by its path, or an entry of a summary: its `json` path, a colon, its name."""
+        """A `table` by its path, or an entry of a summary: its `json` path, a colon, its name.
+
+        Of a path with {}, which stands for T, those of all `samples`, by T.
+        """
+        if "{}" in name:
+            return {t: self.source(name.format(t)) for t in self.samples}
         path, _, entry = name.partition(":")
         return self.json(path)[entry] if entry else self.table(path)
 
@@ -86,14 +91,6 @@ class Results:
     def samples(self) -> list[int]:
         """The T's of paper 2021, increasing."""
         return sorted(self.settings["paper2021"]["samples"])
-
-    def each_table(self, path: str) -> dict[int, pd.DataFrame]:
-        """By T, the tables of ``path``, in which {} stands for T."""
-        return {t: self.table(path.format(t)) for t in self.samples}
-
-    def each_json(self, path: str) -> dict[int, dict]:
-        """By T, the summaries of ``path``, in which {} stands for T."""
-        return {t: self.json(path.format(t)) for t in self.samples}
 
     def posterior(self, name: str) -> pd.DataFrame:
         """Truth, mean and sd (m) per coordinate: of converged chains, else linearised."""
