@@ -137,18 +137,8 @@ def describe_schema() -> str:
     """config/README.md: every key of the schema with its meaning, as Markdown."""
     with open(SCHEMA, encoding="utf-8") as handle:
         schema = yaml.safe_load(handle)
-    lines = [
-        "# Configuration",
-        "",
-        "`config.yaml` at the top is the one file to edit; `config/config.yaml`, where the",
-        "Snakemake workflow catalog and `snakedeploy` look for it, is a link to it. What it leaves",
-        "out has the default. Made from `workflow/schemas/config.schema.yaml` by",
-        "`python -m imuarray_papers.config`; a test keeps the three in step. Unknown keys are",
-        "errors.",
-        "",
-        "| key | meaning | default |",
-        "|---|---|---|",
-    ]
+    lines = ["# Configuration", "", schema["description"]]
+    lines += ["| key | meaning | default |", "|---|---|---|"]
     return "\n".join([*lines, *_rows(schema, schema["$defs"], "")]) + "\n"
 
 

@@ -11,6 +11,7 @@ from imuarray_papers.blind.cases import HIDDEN, hidden, make
 from imuarray_papers.figures import criticism
 from imuarray_papers.figures import hidden as hidden_figure
 from imuarray_papers.figures.criticism import QUANTITIES
+from imuarray_papers.figures.style import columns
 
 ROOT = Path(__file__).parents[2]
 STEPS = ("normal", "robust", "clocks", "no arms", "common arms")
@@ -73,8 +74,8 @@ def test_the_panels_have_what_was_computed(board):
 
 
 def test_the_table_answers_the_four_questions(board):
-    table, columns, *_ = criticism.table_criticism(**board, recordings=mimu4444_corners())
-    assert len(table) == 5 and list(table) == [column.name for column in columns]
+    table, _ = criticism.table_criticism(**board, recordings=mimu4444_corners())
+    assert len(table) == 5 and list(table) == [column.name for column in columns("criticism")]
     text = "\n".join(table.astype(str).sum(axis=1))
     for said in ("accelerometers 4, gyroscopes 4", "1.50 ms ahead", "26.0", "100 µm", "7.0 µm; +81",
                  "13 µm", "16 × the noise"):  # fmt: skip
@@ -125,7 +126,7 @@ def test_a_row_says_what_was_found_of_what_was_hidden():
     right = {"causes": [before, cause("accelerometer_bias", ["3"], found)]}
     cases = [right, {"causes": [before]}, {"causes": [before, other]}]
     control = {"causes": [before]}, {}
-    table, *_ = hidden_figure.table_criticism_hidden(
+    table, _ = hidden_figure.table_criticism_hidden(
         [(each, {}) for each in cases], [truth] * 3, [control] * 3, list("abc")
     )
     assert table.named.tolist() == ["accelerometer_bias", "nothing", "shock"]

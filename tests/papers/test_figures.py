@@ -356,27 +356,28 @@ def two_tables():
 
 
 def test_tables(tmp_path):
-    for number, (table, columns, heading, lines) in enumerate(two_tables()):
-        paths = {kind: tmp_path / f"{number}.{kind}" for kind in ("csv", "tex", "md")}
-        style.write_table(table, columns, f"{heading}, 50 %", lines, **paths)
+    for name, (table, words) in zip(("2021_table1", "2021_table2"), two_tables(), strict=True):
+        paths = {kind: tmp_path / f"{name}.{kind}" for kind in ("csv", "tex", "md")}
+        style.write_table(name, table, words, **paths)
         read = pd.read_csv(paths["csv"])
         pd.testing.assert_frame_equal(read, rounded(table), check_dtype=False, check_exact=True)
         rows = [line for line in paths["md"].read_text().splitlines() if line.startswith("|")]
         assert len(rows) == len(table) + 2
-        assert {row.count("|") for row in rows} == {len(columns) + 1}
+        assert {row.count("|") for row in rows} == {len(style.columns(name)) + 1}
         tex = paths["tex"].read_text()
-        assert r"50 \%" in tex and "these are ours" in tex
+        assert "these are ours" in tex and r"50 \%" in style.latex(table, [], "50 %", [])
         assert tex.count(r"\\") == len(table) + 1
 
 
 def test_table2_compares_with_the_last_source():
-    (first, *_), (table, _, _, lines) = two_tables()
+    (first, _), (table, words) = two_tables()
     np.testing.assert_allclose(table.ratio, [100, 110, 1] * 3)
     np.testing.assert_allclose(table.sd_median_m[:3], [2e-4, 2.2e-4, 2e-6])
     assert table.source[0] == "experiment (measured)"
-    assert "IMUs: 2 (experiment" in lines[1] and "recording exp_1" in lines[0]
-    assert style.unfinished(table, 1.05) == []
-    assert "3 of 3" in style.unfinished(first, 1.05)[0]
+    lines = style.notes("2021_table2", words)
+    assert "IMUs: 2 (experiment" in lines[1] and "recording exp_1" in lines[0] and len(lines) == 3
+    assert style.unfinished(table, 1.05) == ""
+    assert "3 of 3" in style.unfinished(first, 1.05)
 
 
 def test_captions_and_gallery():

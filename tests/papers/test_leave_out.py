@@ -13,6 +13,7 @@ from imuarray.engine.course import block_scores
 from imuarray.engine.dataset import engine_dataset
 from imuarray.engine.heldout import log_densities
 from imuarray.engine.linearise import linearise
+from imuarray_papers.figures import style
 from imuarray_papers.figures.board import table_experiment, table_left_out
 from imuarray_papers.measured.left_out import located, predicted
 from tests.engine.test_engine import fitted, simulated
@@ -75,9 +76,9 @@ def test_a_board_predicts_another_recording():
     by = table.set_index("model")
     assert by.over_inflated.board > 5 and abs(by.over_board.own) < 0.3
     assert (by.samples == len(readings.time)).all() and by.converged.all()
-    rows, columns, _, notes = table_left_out([table], ["one"], "board")
-    assert rows.board[0] == by.over_inflated.board and "board" in notes[0]
-    assert {column.name for column in columns} == set(rows)
+    rows, words = table_left_out([table], ["one"], "board")
+    assert rows.board[0] == by.over_inflated.board and words == {"group": "board"}
+    assert {column.name for column in style.columns("left_out")} == set(rows)
 
 
 def test_positions_from_few_samples_are_those_of_a_fit_with_the_sensors_held():
@@ -100,6 +101,6 @@ def test_positions_from_few_samples_are_those_of_a_fit_with_the_sensors_held():
     assert (narrow < sd).all()
     papers = pd.DataFrame({"samples": [20], "assumed": ["0.8"], "claimed_m": [1.0]})
     moved = found.assign(position=found.position + 1e-6)
-    table, columns, *_ = table_experiment([found, moved], ["a", "b"], papers, "board")
+    table, _ = table_experiment([found, moved], ["a", "b"], papers, "board")
     assert table.model.tolist() == ["papers', σa 0.8 m/s²", "sensors", "sensors"]
     np.testing.assert_allclose(table.spread_m[1:], 1e-6 / np.sqrt(2))

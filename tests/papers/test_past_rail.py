@@ -12,7 +12,7 @@ from imuarray.analysis.sensors import fitted
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.provenance import write_netcdf
-from imuarray_papers.figures.board import draw_past_rail, table_past_rail
+from imuarray_papers.figures.board import figure_past_rail, table_past_rail
 from imuarray_papers.measured.left_out import _choose, _hidden, past_rail
 from tests.cases import known, model
 
@@ -45,10 +45,10 @@ def test_the_right_model_predicts_what_is_withheld(withheld, found):
     assert np.all(errors.calibrated < errors.clipped)
     board = table[table.model == "board"]
     assert np.all(np.abs(board.within_95 - 0.95) < 0.05)
-    figure = draw_past_rail(table, 300, ["a footer"])
+    figure = figure_past_rail(300, ["a footer"])(table)
     assert all(len(axes.lines) == 7 for axes in figure.axes)
-    rows, _, _, notes = table_past_rail([table, table], ["a", "b"], "board")
-    assert len(rows) == 4 and "without the withheld readings" in notes[0]
+    rows, words = table_past_rail([table, table], ["a", "b"], "board")
+    assert len(rows) == 4 and words == {"group": "board"}
 
 
 def test_effects_beside_a_calibration_s_model_are_refused(withheld, found, tmp_path, capsys):

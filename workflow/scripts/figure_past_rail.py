@@ -3,10 +3,8 @@
 from imuarray_papers.pipeline.job import job
 
 with job(snakemake):
-    from functools import partial
-
     from imuarray.recording import load_dataset, read_recording
-    from imuarray_papers.figures.board import draw_past_rail
+    from imuarray_papers.figures.board import figure_past_rail
     from imuarray_papers.figures.style import write_figure
     from imuarray_papers.measured.left_out import ASSUMED, BINS, past_rail
 
@@ -18,5 +16,4 @@ with job(snakemake):
         f" fastest axis; papers' model with σa = {ASSUMED:g} m/s². Positions, delay and all other"
         " parameters of the board are from the other recordings."
     ]
-    draw = partial(draw_past_rail, rail_dps=BINS[0], footer=footer)
-    write_figure(draw, table, **dict(snakemake.output.items()))
+    write_figure(figure_past_rail(BINS[0], footer), table, **dict(snakemake.output.items()))

@@ -3,20 +3,14 @@
 import numpy as np
 from scipy.special import chdtrc
 
-from imuarray_papers.claims.registry import (
-    claim,
-    listed,
-    near,
-    power_law,
-    ratio,
-    rises,
-    show,
-    untested,
-    verdict,
-)
+from imuarray_papers.claims.numbers import listed, near, power_law, ratio, rises, show
+from imuarray_papers.claims.registry import claim, untested, verdict
 
 SAMPLES = "calibration/position_error_samples"
 MOTION = "calibration/position_error_motion"
+BOUND = "claims/position_bound"
+RATE, ACCELERATION = "angular_rate_dps", "angular_acceleration_dps2"
+UNITS = {RATE: "deg/s", ACCELERATION: "deg/s^2"}
 
 
 def _curve(results, iterations=None):
@@ -46,20 +40,16 @@ def inverse_root(results):
     return verdict(slope, error, near(slope, -0.5, error, 0.05), remark)
 
 
-ERROR_NOT = "the abstract's word is right for the variance, not for the error; section IV says -1/2"
-
-
-@claim("2017-02", power=1, remark=ERROR_NOT)
+@claim("2017-02", power=1)
 @claim("2017-03", power=2)
-def inverse(results, power, remark=""):
+def inverse(results, power):
     """Verdict on the exponent of the error (power 1), or of its square, the variance."""
     slope, error = (power * part for part in _exponent(results)[:2])
-    return verdict(slope, error, near(slope, -1, error, 0.05 * power), remark)
+    return verdict(slope, error, near(slope, -1, error, 0.05 * power))
 
 
-@claim("2017-44")
-def complete(results):
-    table = results.table(SAMPLES)
+@claim("2017-44", SAMPLES)
+def complete(table):
     rmse = table[table.samples >= 10].pivot(index="iterations", columns="samples", values="rmse_m")
     last = rmse.iloc[-1]
     # what is left to go falls by the same factor in each iteration, as the last two levels show;
@@ -88,9 +78,8 @@ def thousand(results, most, least=0.0, errors=0):
     return verdict(f"{show(row.rmse_m)} m", f"{show(row.rmse_se_m, 2)} m", stands)
 
 
-@claim("2017-05")
-def two_samples(results):
-    table = results.table(SAMPLES)
+@claim("2017-05", SAMPLES)
+def two_samples(table):
     two = table[table.samples == 2].sort_values("iterations")
     first, last = two.iloc[0], two.iloc[-1]
     value, error = ratio(last.rmse_m, last.rmse_se_m, first.rmse_m, first.rmse_se_m)
@@ -102,12 +91,11 @@ def two_samples(results):
     return verdict(value, error, value >= 1 - 3 * error, remark)
 
 
-@claim("2017-06")
-def two_ill_posed(results):
-    ranks = results.table("claims/ranks")
+@claim("2017-06", "claims/ranks", BOUND)
+def two_ill_posed(ranks, bound):
     two = ranks[ranks.samples == 2]
     deficient = int(np.sum(two["rank"] < two.unknowns))
-    bound = results.table("claims/position_bound").iloc[0]
+    bound = bound.iloc[0]
     remark = (
         f"Cramer-Rao bound at N = 2: {show(bound.bound_m)} +- {show(bound.bound_se_m, 2)} m; slow"
         " convergence, not a missing condition, keeps the RMSE up"
@@ -115,9 +103,8 @@ def two_ill_posed(results):
     return verdict(f"{deficient} of {len(two)} arrays deficient", "", deficient > 0, remark)
 
 
-@claim("2017-07")
-def more_iterations(results):
-    table = results.table(SAMPLES)
+@claim("2017-07", SAMPLES)
+def more_iterations(table):
     worst, up = 0.0, 0
     for _, curve in table[table.samples > 2].groupby("samples"):
         curve = curve.sort_values("iterations")
@@ -144,32 +131,30 @@ def more_samples(results):
     return verdict(value, f"{listed(curve.rmse_se_m, 2)} m", up == 0 and falls, remark)
 
 
-def _steps_up(results, table, along, across):
-    """Over figure 5's grid: what is said of its steps up, how many, where, the bound's own."""
+def _steps_up(results, table, along, across, remark):
+    """Verdict on figure 5's steps up; the ``remark`` gets the number of the bound's own."""
     table = table.sort_values(along)
     up = {level: rises(line.rmse_m, line.rmse_se_m) for level, line in table.groupby(across)}
-    bound = results.table("claims/position_bound")
+    bound = results.table(BOUND)
     grid = bound[bound.samples == results.settings["paper2017"]["fig5_samples"]].iloc[1:]
     lines = grid.sort_values(along).groupby(grid[across].round(3))
     bounds = sum(rises(line.bound_m, line.bound_se_m) for _, line in lines)
     count = sum(up.values())
     text = f"{count} of {len(table) - table[across].nunique()} steps go up"
-    return text, count, ", ".join(show(level, 6) for level in up if up[level]), bounds
+    where = ", ".join(show(level, 6) for level in up if up[level])
+    where = f"at {where} {UNITS[across]}; " if where else ""
+    return verdict(text, "3 errors a step", count == 0, where + remark.format(bounds))
 
 
 @claim("2017-09")
 def faster_rotation(results):
-    names = ("angular_rate_dps", "angular_acceleration_dps2")
-    text, up, where, bounds = _steps_up(results, results.table(MOTION), *names)
-    remark = f"at {where} deg/s^2; " if where else ""
-    remark += f"the Cramer-Rao bound itself goes up in {bounds} steps"
-    return verdict(text, "3 errors a step", up == 0, remark)
+    remark = "the Cramer-Rao bound itself goes up in {} steps"
+    return _steps_up(results, results.table(MOTION), RATE, ACCELERATION, remark)
 
 
 def _beyond(table, limit) -> str:
     """A remark on our rows of figure 5 at accelerations above ``limit`` (deg/s^2)."""
-    levels = {a: row.set_index("angular_rate_dps")
-              for a, row in table.groupby("angular_acceleration_dps2")}  # fmt: skip
+    levels = {a: row.set_index(RATE) for a, row in table.groupby(ACCELERATION)}
     text, near = "", levels[max(a for a in levels if a <= limit)]
     for level in (a for a in levels if a > limit):
         row = levels[level]
@@ -188,20 +173,16 @@ def _beyond(table, limit) -> str:
 
 @claim("2017-10")
 def faster_acceleration(results):
-    names = ("angular_acceleration_dps2", "angular_rate_dps")
     whole = results.table(MOTION)
     hand = results.settings["paper2021"]["angular_acceleration_sd_dps2"]
     table = whole[whole.angular_acceleration_dps2 <= hand]
-    text, up, where, bounds = _steps_up(results, table, *names)
-    remark = f"at {where} deg/s; " if where else ""
-    remark += "figure 5's axes are not in the text; the Cramer-Rao bound goes up in"
-    remark += f" {bounds} steps of our whole grid{_beyond(whole, hand)}"
-    return verdict(text, "3 errors a step", up == 0, remark)
+    remark = "figure 5's axes are not in the text; the Cramer-Rao bound goes up in {} steps of our"
+    remark += f" whole grid{_beyond(whole, hand)}"
+    return _steps_up(results, table, ACCELERATION, RATE, remark)
 
 
-@claim("2017-11")
-def translation(results):
-    table = results.table("calibration/position_error_force")
+@claim("2017-11", "calibration/position_error_force")
+def translation(table):
     weight = table.rmse_se_m**-2.0
     mean = np.sum(weight * table.rmse_m) / weight.sum()
     statistic = float(np.sum(weight * (table.rmse_m - mean) ** 2))
@@ -215,8 +196,7 @@ def translation(results):
 @claim("2017-12")
 def efficient(results):
     last = _curve(results).iloc[-1]
-    bound = results.table("claims/position_bound")
+    bound = results.table(BOUND)
     row = bound[bound.samples == last.samples].iloc[0]
     value, error = ratio(last.rmse_m, last.rmse_se_m, row.bound_m, row.bound_se_m)
-    remark = "the paper leaves the bound for the calibration problem open; here it is computed"
-    return verdict(value, error, value + 3 * error < 1.1, remark)
+    return verdict(value, error, value + 3 * error < 1.1)

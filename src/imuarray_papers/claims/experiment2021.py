@@ -8,16 +8,10 @@ from scipy.special import bdtr
 
 from imuarray.geometry import UNDERSIDE_ROTATION
 from imuarray.recording.units import GRAVITY
+from imuarray_papers.claims.numbers import by_samples, falls, listed, show
 from imuarray_papers.claims.posterior2021 import covered
-from imuarray_papers.claims.registry import (
-    by_samples,
-    claim,
-    falls,
-    listed,
-    show,
-    untested,
-    verdict,
-)
+from imuarray_papers.claims.registry import claim, untested, verdict
+from imuarray_papers.claims.results import SEVERAL
 
 RANGE = 157.0  # m/s^2, where the accelerometers saturate
 
@@ -71,11 +65,8 @@ def attributed(results):
     )
     total = {t: wide[t] / narrow[t] for t in results.samples}
     share = {t: np.log(wide[t] / slow[t]) / np.log(total[t]) for t in results.samples}
-    remark = (
-        "the rest is slower motion: twisting as simulated turns less than section IV-A's motion"
-    )
     value = f"share {by_samples(share, 2)} of {by_samples(total)}"
-    return verdict(value, "none: linearised", min(share.values()) > 0.5, remark)
+    return verdict(value, "none: linearised", min(share.values()) > 0.5)
 
 
 @claim("2021-45")
@@ -114,12 +105,8 @@ def doubled(results):
     factors = [abs((UNDERSIDE_ROTATION @ d - d) @ d) for d in (across, np.array([0.0, 0, 1]), axis)]
     value = f"topside {show(np.abs(top).max())}; underside {listed(factors[:2])}"
     value += f", along the axis {show(factors[2], 2)}"
-    remark = (
-        "an offset along the axis of rotation moves all triads alike and cannot be seen; halving"
-        " the shift therefore gives the in-package position only across that axis"
-    )
     stands = np.allclose(factors[:2], 2) and not top.any()
-    return verdict(value, "none", stands, remark)
+    return verdict(value, "none", stands)
 
 
 @claim("2021-53")
@@ -172,12 +159,8 @@ def _sides(results):
 @claim("2021-49")
 def quadrant(results):
     under, _ = _sides(results)
-    remark = (
-        "with the y axis drawn downwards (-, -) is the upper left quadrant seen from above,"
-        " the upper right one seen from below"
-    )
     value = f"mean ({listed(1e3 * under.mean(axis=0))}) mm"
-    return verdict(value, "", bool(np.all(np.sign(under) == np.sign(under[0]))), remark)
+    return verdict(value, "", bool(np.all(np.sign(under) == np.sign(under[0]))))
 
 
 @claim("2021-63")
@@ -187,24 +170,18 @@ def centred(results):
     return verdict(f"mean ({listed(1e3 * above)}) mm", "", bool(stands))
 
 
-def agreement(results):
-    """Coverage between recordings by assumed sigma_a, at the largest T; None of a single one."""
-    table = results.of_board(f"agreement/{results.board}")
-    if table is None:
-        return None
+def agreement(results, otherwise=SEVERAL):
+    """Coverage between recordings by assumed sigma_a, at the largest T."""
+    table = results.of_board(f"agreement/{results.board}", otherwise)
     table = table[table.samples == results.samples[-1]]
     return table.set_index(table.assumed.astype(str))
 
 
 @claim("2021-52")
 def underestimated(results):
-    table = agreement(results)
-    if table is None:
-        chance = float(bdtr(10, 15, 1 - 1 / 31))
-        return untested(
-            "several measured recordings needed",
-            f"10 or fewer of 15 has probability {show(chance, 2)} at 97 %",
-        )
+    chance = float(bdtr(10, 15, 1 - 1 / 31))
+    words = f"10 or fewer of 15 has probability {show(chance, 2)} at 97 %"
+    table = agreement(results, untested("several measured recordings needed", words))
     row = table.loc[f"{results.settings['experiment']['accelerometer_sd']:g}"]
     value = f"{100 * row.coverage_95:.0f} % covered, rms z {show(row.z_rms)}"
     remark = f"{row.recordings} recordings, T = {results.samples[-1]}; claimed sd"
@@ -214,9 +191,7 @@ def underestimated(results):
 
 @claim("2021-55")
 def conservative(results):
-    table = agreement(results)
-    if table is None:
-        return untested("several measured recordings needed")
+    table = agreement(results, untested("several measured recordings needed"))
     found, used = table.loc["residual"], results.settings["experiment"]["accelerometer_sd"]
     value = f"{show(found.accelerometer_sd)} m/s^2 in the residual"
     remark = f"with it {100 * found.coverage_95:.0f} % of the 95 % intervals cover, rms z"
@@ -227,8 +202,8 @@ def conservative(results):
 @claim("2021-57")
 def localised(results):
     limit = 2 * results.settings["paper2021"]["variance_target"]
-    verdicts = results.each_json(f"posterior/{results.measured}_T{{}}")
-    found = {t: v["variance_at_most_draws"] for t, v in verdicts.items()}
-    most = max(v["most_draws"] for v in verdicts.values())
-    remark = f"N = {most}; the chains here draw omega around the integrand's mode where it fails"
+    entries = ("variance_at_most_draws", "most_draws")
+    found, most = (results.source(f"posterior/{results.measured}_T{{}}:{x}") for x in entries)
+    remark = f"N = {max(most.values())}; the chains here draw omega around the integrand's mode"
+    remark += " where it fails"
     return verdict(by_samples(found), "", all(v <= limit for v in found.values()), remark)

@@ -5,28 +5,16 @@ from scipy.special import chdtri
 
 from imuarray.geometry import array_from_config
 from imuarray.posterior.diagnostics import ess
-from imuarray_papers.claims.registry import (
-    CLOCK,
-    by_samples,
-    claim,
-    falls,
-    listed,
-    near,
-    show,
-    untested,
-    verdict,
+from imuarray_papers.claims.numbers import by_samples, falls, listed, near, show
+from imuarray_papers.claims.registry import CLOCK, claim, untested, verdict
+
+ESS, Z, STEPS, CHAINS = (
+    f"posterior/T{{}}:{entry}" for entry in ("ess_min", "split_z_max", "steps", "chains")
 )
 
 
-def _verdicts(results, *names):
-    """By T, the entries ``names`` of the chains' verdicts: a dict for each."""
-    found = results.each_json("posterior/T{}")
-    return [{t: verdict[name] for t, verdict in found.items()} for name in names]
-
-
-@claim("2021-27")
-def chains_agree(results):
-    rhat, ess, z, steps = _verdicts(results, "rhat_max", "ess_min", "split_z_max", "steps")
+@claim("2021-27", "posterior/T{}:rhat_max", ESS, Z, STEPS)
+def chains_agree(rhat, ess, z, steps):
     remark = (
         f"smallest effective sizes {by_samples(ess)}; largest |z| of the chains' means"
         f" {by_samples(z)}; steps {by_samples(steps, 7)}"
@@ -34,21 +22,20 @@ def chains_agree(results):
     return verdict(by_samples(rhat, 4), "", max(rhat.values()) < 1.05, remark)
 
 
-@claim("2021-28")
-def means_agree(results):
-    z, ess = _verdicts(results, "split_z_max", "ess_min")
+@claim("2021-28", Z, ESS)
+def means_agree(z, ess):
     stands = max(z.values()) < 4.5 and min(ess.values()) > 100
     return verdict(by_samples(z), "1 by construction", stands)
 
 
 @claim("2021-29")
 def burn_in(results):
-    tables = results.each_table("posterior/burn_in_T{}")
+    tables = results.source("posterior/burn_in_T{}")
     # the first candidate is none, the second the entry
     best = {t: table.rhat_max[table.burn_in > 0].min() for t, table in tables.items()}
-    (steps,) = _verdicts(results, "burn_in_steps")
     stands = max(best.values()) < results.settings["paper2021"]["rhat_threshold"]
-    remark = f"burn-in chosen: {by_samples(steps, 7)} steps"
+    steps = by_samples(results.source("posterior/T{}:burn_in_steps"), 7)
+    remark = f"burn-in chosen: {steps} steps"
     return verdict(by_samples(best, 4), "", stands, remark)
 
 
@@ -94,8 +81,8 @@ def honest(results):
 
 @claim("2021-34")
 def robust(results):
-    prior, (good,) = results.settings["paper2021"]["prior_sd"], _verdicts(results, "converged")
-    tables = results.each_table("posterior/T{}")
+    good, tables = (results.source(f"posterior/T{{}}{end}") for end in (":converged", ""))
+    prior = results.settings["paper2021"]["prior_sd"]
     ratios = {t: table.sd_m.max() / prior for t, table in tables.items()}
     stands = all(good.values()) and max(ratios.values()) < 0.1
     value = f"{sum(good.values())} of {len(good)} converged"
@@ -103,14 +90,10 @@ def robust(results):
     return verdict(value, "", stands)
 
 
-@claim("2021-35")
-def efficient(results):
-    ess, steps, chains = _verdicts(results, "ess_min", "steps", "chains")
+@claim("2021-35", ESS, STEPS, CHAINS)
+def efficient(ess, steps, chains):
     rate = {t: 1000 * ess[t] / (steps[t] * chains[t]) for t in ess}
-    return untested(
-        "no effective size or length of chain in the text",
-        f"smallest effective size a 1000 steps {by_samples(rate)}",
-    )
+    return untested(value=f"smallest effective size a 1000 steps {by_samples(rate)}")
 
 
 def covered(draws, points, level=1 - 1 / 31):
@@ -142,21 +125,18 @@ def coverage(results):
     return verdict(f"{inside} of {count}", error, inside >= 26, remark)
 
 
-@claim("2021-38")
-def costs(results):
-    table = results.table("claims/timing")
+@claim("2021-38", "claims/timing")
+def costs(table):
     rows = table[table.what == "transition"].sort_values("samples")
     dearer = rows.seconds.iloc[-1] > 3 * rows.seconds.iloc[0]
     value = f"{'more' if dearer else 'not more'} than 3 times from the first of T = "
     return verdict(f"{value}{listed(rows.samples)} to the last", "", dearer, CLOCK)
 
 
-@claim("2021-39")
-def run_time(results):
-    taken, chains = _verdicts(results, "steps", "chains")
+@claim("2021-39", STEPS, CHAINS)
+def run_time(taken, chains):
     steps = {t: taken[t] * chains[t] for t in taken}
-    reason = "neither number of steps nor code is published; ours: benchmarks/chains/ in results/"
-    return untested(reason, f"{by_samples(steps, 7)} steps")
+    return untested(value=f"{by_samples(steps, 7)} steps")
 
 
 def size_offset(results, name) -> tuple[float, float, float]:
@@ -167,7 +147,7 @@ def size_offset(results, name) -> tuple[float, float, float]:
     """
     nominal = array_from_config(results.settings["array"]).relative
     nominal = nominal - nominal.mean(axis=0)
-    table = results.posterior(name)[0]
+    table = results.posterior(name)
     truth = table.truth_m.to_numpy().reshape(-1, 3)
     # the reference triad is at zero in truth and draws, so its term vanishes
     scales = np.einsum("cnka,ka->cn", results.chains(name) - truth, nominal[1:])

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from imuarray_papers.claims.registry import claim, listed, ratio, show, untested, verdict
+from imuarray_papers.claims.numbers import listed, ratio, show
+from imuarray_papers.claims.registry import claim, untested, verdict
 
 COMPARABLE = 2.0  # "comparable" in the papers: within this factor
 SAME = 1.3  # "comparable to having no error at all"

@@ -8,6 +8,11 @@ import numpy as np
 import pandas as pd
 
 from imuarray.errors import InputError
+from imuarray_papers.claims.registry import Missing, Outcome, untested
+
+SEVERAL = untested(
+    "several measured recordings with still poses needed, and more than the quick scale"
+)
 
 
 class Results:
@@ -27,12 +32,15 @@ class Results:
         """A CSV file below results/measured, by its path without the ending."""
         return self._cached(f"../measured/{path}", ".csv", pd.read_csv)
 
-    def of_board(self, path: str) -> pd.DataFrame | None:
-        """`measured_table` of what only a board of several recordings has, or None."""
+    def of_board(self, path: str, otherwise: Outcome = SEVERAL) -> pd.DataFrame:
+        """`measured_table` of what only a board of several recordings has.
+
+        Where there is none, the claim has the outcome ``otherwise``.
+        """
         try:
             return self.measured_table(path)
         except InputError:
-            return None
+            raise Missing(otherwise) from None
 
     def replace(self, contents: dict) -> Self:
         """A copy with other ``contents`` by path."""
@@ -55,6 +63,16 @@ class Results:
         # tables and summaries of one posterior differ only in their ending
         return self._cached(f"{path}.json", "", lambda p: json.loads(p.read_text("utf-8")))
 
+    def source(self, name: str):
+        """A `table` by its path, or an entry of a summary: its `json` path, a colon, its name.
+
+        Of a path with {}, which stands for T, those of all `samples`, by T.
+        """
+        if "{}" in name:
+            return {t: self.source(name.format(t)) for t in self.samples}
+        path, _, entry = name.partition(":")
+        return self.json(path)[entry] if entry else self.table(path)
+
     def chains(self, name: str) -> np.ndarray:
         """Draws (chains, n, A - 1, 3) m of chains/``name``, the burn-in left out."""
 
@@ -74,22 +92,10 @@ class Results:
         """The T's of paper 2021, increasing."""
         return sorted(self.settings["paper2021"]["samples"])
 
-    def each_table(self, path: str) -> dict[int, pd.DataFrame]:
-        """By T, the tables of ``path``, in which {} stands for T."""
-        return {t: self.table(path.format(t)) for t in self.samples}
-
-    def each_json(self, path: str) -> dict[int, dict]:
-        """By T, the summaries of ``path``, in which {} stands for T."""
-        return {t: self.json(path.format(t)) for t in self.samples}
-
-    def posterior(self, name: str) -> tuple[pd.DataFrame, str]:
-        """Truth, mean and sd (m) per coordinate, and where they come from.
-
-        The chains where they have converged, else the linearised posterior.
-        """
-        if self.json(f"posterior/{name}")["converged"]:
-            return self.table(f"posterior/{name}"), "chains"
-        return self.linearised(name), "linearised"
+    def posterior(self, name: str) -> pd.DataFrame:
+        """Truth, mean and sd (m) per coordinate: of converged chains, else linearised."""
+        converged = self.json(f"posterior/{name}")["converged"]
+        return self.table(f"posterior/{name}") if converged else self.linearised(name)
 
     def linearised(self, name: str) -> pd.DataFrame:
         """The linearised posterior called ``name``, as in `posterior`."""
@@ -98,7 +104,7 @@ class Results:
 
     def posteriors(self, prefix: str = "") -> dict[int, pd.DataFrame]:
         """By T, what `posterior` gives of ``prefix`` T..."""
-        return {t: self.posterior(f"{prefix}T{t}")[0] for t in self.samples}
+        return {t: self.posterior(f"{prefix}T{t}") for t in self.samples}
 
     def unconverged(self, name: str) -> str:
         """A remark on chains that have not converged."""

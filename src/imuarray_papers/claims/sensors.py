@@ -4,19 +4,19 @@ import numpy as np
 import pandas as pd
 
 from imuarray_papers.claims.experiment2021 import agreement
-from imuarray_papers.claims.registry import claim, show, untested, verdict
+from imuarray_papers.claims.numbers import show
+from imuarray_papers.claims.registry import Missing, claim, untested, verdict
+from imuarray_papers.claims.results import SEVERAL
 
 DEGREES = float(np.degrees(1.0))
 OF_NOISE = "accelerometer_noise", "gyroscope_noise", "coloured_noise", "heavy_tails", "shock"
-SEVERAL = untested(
-    "several measured recordings with still poses needed, and more than the quick scale"
-)
+NO_POSES = untested("a recording with still poses needed")
 
 
-def _still(results) -> pd.DataFrame | None:
-    """Noise of the still poses, a row an axis; None of a recording without."""
+def _still(results, otherwise=NO_POSES) -> pd.DataFrame:
+    """Noise of the still poses, a row an axis."""
     if not results.settings["recordings"][results.measured].get("first_order", True):
-        return None
+        raise Missing(otherwise)
     return results.measured_table(f"first_order/{results.measured}_noise")
 
 
@@ -24,8 +24,6 @@ def _still(results) -> pd.DataFrame | None:
 @claim("2021-58", sensor="angular_rate", key="gyroscope_sd_dps", unit="deg/s", factor=DEGREES)
 def noise(results, sensor, key, unit, factor):
     table = _still(results)
-    if table is None:
-        return untested("a recording with still poses needed")
     found = factor * table[table.sensor == sensor].sd.median()
     stands = 1 / 1.5 < found / results.settings["noise"][key] < 1.5
     return verdict(
@@ -35,10 +33,7 @@ def noise(results, sensor, key, unit, factor):
 
 @claim("2021-59")
 def white(results):
-    table = _still(results)
-    if table is None:
-        return untested("a recording with still poses needed")
-    spans = table.groupby("sensor", sort=False).correlation.agg(["min", "max"])
+    spans = _still(results).groupby("sensor", sort=False).correlation.agg(["min", "max"])
     names = {"specific_force": "accelerometers", "angular_rate": "gyroscopes"}
     said = [f"{names[k]} {row['min']:.2f} to {row['max']:.2f}" for k, row in spans.iterrows()]
     stands = bool(spans.abs().to_numpy().max() < 0.05)
@@ -47,23 +42,17 @@ def white(results):
 
 @claim("2021-60")
 def valid(results):
-    table, still = agreement(results), _still(results)
-    if table is None or still is None:
-        return SEVERAL
+    table, still = agreement(results), _still(results, SEVERAL)
     ratio = table.accelerometer_sd["residual"] / still[still.sensor == "specific_force"].sd.median()
     row = table.loc[f"{results.settings['noise']['accelerometer_sd']:g}"]
     value = f"residual {show(ratio, 2)} times the noise of still poses"
     value += f"; {100 * row.coverage_95:.0f} % of the differences covered with it"
-    remark = "what the model lacks: docs/measured.md"
-    return verdict(value, "", bool(ratio < 1.5 and row.coverage_95 > 0.9), remark)
+    return verdict(value, "", bool(ratio < 1.5 and row.coverage_95 > 0.9))
 
 
 @claim("2021-61")
 def repeated(results):
-    table = agreement(results)
-    if table is None:
-        return SEVERAL
-    row = table.loc[f"{results.settings['experiment']['accelerometer_sd']:g}"]
+    row = agreement(results).loc[f"{results.settings['experiment']['accelerometer_sd']:g}"]
     value = f"{row.recordings} recordings differ by {show(row.z_rms)} claimed sds, rms"
     return verdict(value, "", bool(row.z_rms < 1.5), f"T = {results.samples[-1]}")
 
@@ -83,18 +72,15 @@ def saturates(results):
     return verdict(value, "", sum(shares.values()) < 1, remark)
 
 
-def _steps(results) -> pd.DataFrame | None:
-    """Gain of each cause on the board, by step (`measured.causes`); None of one recording."""
-    table = results.of_board(f"causes_{results.board}")
-    return table if table is None else table.set_index("step")
+def _steps(results) -> pd.DataFrame:
+    """Gain of each cause on the board, by step (`measured.causes`)."""
+    return results.of_board(f"causes_{results.board}").set_index("step")
 
 
 @claim("2017-45", step="own arms", without="no arms")
 @claim("2021-64", step="clocks", without="robust")
 def assumed(results, step, without):
     table = _steps(results)
-    if table is None:
-        return SEVERAL
     row, before = table.loc[step], table.loc[without].smooth_ratio
     value = f"{show(row.nats)} nats a sample gained without the assumption"
     remark = f"the residual of smooth and fast samples falls from {show(before, 2)} to"
@@ -104,9 +90,7 @@ def assumed(results, step, without):
 
 @claim("2021-65")
 def one_rate(results):
-    table, still = results.of_board(f"residuals/{results.measured}"), _still(results)
-    if table is None or still is None:
-        return SEVERAL
+    table, still = results.of_board(f"residuals/{results.measured}"), _still(results, SEVERAL)
     noise = still[still.sensor == "angular_rate"].ratio.pow(2).mean() ** 0.5
     mine = table[(table.quantity == "angular_rate") & (table.source == "measured")]
     sizes = mine.groupby("bin_low").rms.agg(lambda rms: rms.pow(2).mean() ** 0.5) / noise
@@ -117,23 +101,24 @@ def one_rate(results):
 
 @claim("2021-66")
 def mismatch(results):
-    table, before = _steps(results), agreement(results)
-    if table is None or before is None:
-        return SEVERAL
-    last = table.iloc[-1]
-    wide = before.loc[f"{results.settings['experiment']['accelerometer_sd']:g}"]
+    last = _steps(results).iloc[-1]
+    wide = agreement(results).loc[f"{results.settings['experiment']['accelerometer_sd']:g}"]
     value = f"{100 * wide.coverage_95:.0f} % covered, with what the model lacked"
     value += f" {100 * last.covered:.0f} %, of differences of {show(1e6 * last.rms_m, 2)} µm"
     stands = last.covered > max(0.9, wide.coverage_95) and last.rms_m < wide.spread_m
     return verdict(value, "pairs and coordinates not independent", bool(stands))
 
 
+def _gains(results) -> dict[str, float]:
+    """Nats of each cause of the diagnosis, by its name; where the board has several recordings."""
+    _steps(results)
+    causes = results.json(f"../measured/diagnosis/{results.measured}/diagnosis")["causes"]
+    return {cause["effect"]: cause["heldout_gain_nats"] for cause in causes}
+
+
 @claim("2021-67")
 def nonlinear(results):
-    if _steps(results) is None:
-        return SEVERAL
-    causes = results.json(f"../measured/diagnosis/{results.measured}/diagnosis")["causes"]
-    nats = {c["effect"]: c["heldout_gain_nats"] for c in causes if c["effect"] not in OF_NOISE}
+    nats = {effect: gain for effect, gain in _gains(results).items() if effect not in OF_NOISE}
     most = max(nats, key=nats.__getitem__)
     own = sum(gain for effect, gain in nats.items() if "nonlinearity" in effect)
     value = f"{show(own, 2)} nats of {show(nats[most], 2)} ({most})"
@@ -156,7 +141,7 @@ def by_hand(results):
 def averaging(results):
     found = results.json("claims/statements")["averaging"]
     if found is None:
-        return untested("a recording with still poses needed")
+        return NO_POSES
     ratios = list(found.values())
     value = f"accelerometers {show(ratios[0])}, gyroscopes {show(ratios[1])} times sd / root K"
     return verdict(value, "", max(ratios) < 1.25, f"{results.measured}, neighbours' differences")
@@ -174,10 +159,7 @@ def single_sample(results):
 
 @claim("2021-71")
 def error_grows(results):
-    if _steps(results) is None:
-        return SEVERAL
-    causes = results.json(f"../measured/diagnosis/{results.measured}/diagnosis")["causes"]
-    named = any(cause["effect"] == "gyroscope_scale" for cause in causes)
+    named = "gyroscope_scale" in _gains(results)
     found = results.json("claims/statements")["spread"]
     value = f"{show(DEGREES * found['fast'])} deg/s, slow samples {show(DEGREES * found['slow'])}"
     remark = (

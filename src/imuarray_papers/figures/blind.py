@@ -1,15 +1,13 @@
 """The blind study: what an effect is taken for, and what was asked of the diagnosis."""
 
-from functools import partial
-
 import numpy as np
 import pandas as pd
 
-from imuarray.pictures.style import BLACK, BLUE, PAGE, VERMILLION, new_figure, shade, styled
+from imuarray.pictures.style import BLACK, BLUE, PAGE, VERMILLION, shade
 from imuarray_papers.blind import summary
 from imuarray_papers.blind.inject import CATALOGUE
 from imuarray_papers.blind.summary import CRASH, NOTHING, UNEXPLAINED
-from imuarray_papers.figures.style import Column, scale_line
+from imuarray_papers.figures.style import drawing, scale_line
 
 GROUPS = {
     "one": "one effect,\n8 σ or more", "clean": "", "gauge": "gauges",
@@ -17,18 +15,6 @@ GROUPS = {
 }  # fmt: skip
 STRUCK = "struck effects, all"
 TEXT = 5.0  # pt, in cells
-CRITERIA = (
-    Column("bar", "set and what is counted", "set and what is counted"),
-    Column("aim", "bar", "bar"),
-    Column("recordings", "recordings", "n"),
-    Column("share", "measured (%)", r"measured (\%)", "{:.1f}", 100.0),
-    Column("low", "95 % limits: from", "from", "{:.1f}", 100.0),
-    Column("high", "to", "to", "{:.1f}", 100.0),
-    Column("verdict", "verdict", "verdict"),
-    Column("sure", "certain at 95 %", "sure"),
-    Column("all_recordings", "all settings: recordings", "n, all"),
-    Column("all_share", "all settings: measured (%)", r"all (\%)", "{:.1f}", 100.0),
-)
 
 
 def words(name: str) -> str:
@@ -71,16 +57,14 @@ def figure_blind_confusion(rows: dict, settings: dict):
         " Blue: right by class; vermillion and bold: wrong, in all or some of them. A recording"
         " with several names is in several columns; unexplained: the flag, whatever is named.",
     )
-    return partial(_draw_confusion, footer=footer), found
+    lines = confusion_rows(found)[["kind", "truth"]].drop_duplicates()
+    return drawing(_draw_confusion, [footer], PAGE, 1.3 + 0.165 * len(lines)), found
 
 
-@styled
-def _draw_confusion(found, footer):
-    table = confusion_rows(found)
+def _draw_confusion(figure, found):
+    table, axes = confusion_rows(found), figure.subplots()
     columns = names_of(table)
     lines = list(dict.fromkeys(zip(table.kind, table.truth, strict=True)))
-    figure = new_figure([footer], PAGE, 1.3 + 0.165 * len(lines))
-    axes = figure.subplots()
     counts = table.drop_duplicates(["kind", "truth"]).recordings
     place = {line: number for number, line in enumerate(lines)}
     for row in table.itertuples():
@@ -91,7 +75,6 @@ def _draw_confusion(found, footer):
     axes.xaxis.tick_top()
     axes.set(xlim=(-0.5, len(columns) - 0.5), ylim=(len(lines) - 0.5, -0.5))
     _separate(axes, lines, columns)
-    return figure
 
 
 def _cell(axes, column: int, line: int, row) -> None:
@@ -132,15 +115,5 @@ def table_blind_bars(rows: dict, settings: dict):
     table = summary.criteria(found)
     # empty where there is no verdict to be sure of
     table["sure"] = table.sure.map({True: "yes", False: "no"}).fillna("")
-    notes = [
-        f"{scale_line(settings)}; {len(found)} recordings, {int(found.crash.sum())} without an"
-        " answer. Measured: on 8 IMUs, 125 Hz, 24 s, for which the bars are set; all settings"
-        " beside it. Limits: Clopper and Pearson's; of the coverage, from the spread between"
-        " recordings.",
-        "Right class: the effect is named, or among those that the named one is said to be"
-        " indistinguishable from. A wrong name: in its class there is nothing of the truth. A"
-        " crash counts as a miss where a bar is a least share, and has a bar of its own. In a"
-        " gauge the array is not determined, and no intervals around one answer can cover.",
-    ]
-    caption = "Blind study: what was asked of the diagnosis, and what was measured."
-    return table, CRITERIA, caption, notes
+    crashed = int(found.crash.sum())
+    return table, {"scale": scale_line(settings), "recordings": len(found), "crashed": crashed}

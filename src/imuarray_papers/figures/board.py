@@ -6,8 +6,8 @@ And its recordings' diagnoses: do positions, and the causes' numbers, agree?
 import numpy as np
 import pandas as pd
 
-from imuarray.pictures.style import PAGE, logarithmic, look, new_figure, styled
-from imuarray_papers.figures.style import Column, rms
+from imuarray.pictures.style import PAGE, logarithmic, look
+from imuarray_papers.figures.style import columns, drawing, rms
 from imuarray_papers.measured.positions import agreement, coordinate_table, pairwise
 
 MODELS = ("base", "inflated", "extended")  # sections of a diagnosis that have positions
@@ -20,10 +20,12 @@ SERIES = {
 }
 
 
-@styled
-def draw_past_rail(table: pd.DataFrame, rail_dps: float, footer=()):
+def figure_past_rail(rail_dps: float, footer=()):
     """Median error and RMSE of the withheld readings over the angular rate; log-log."""
-    figure = new_figure(footer, PAGE, 2.8)
+    return drawing(_draw_past_rail, footer, PAGE, rail_dps=rail_dps)
+
+
+def _draw_past_rail(figure, table, rail_dps):
     panels = figure.subplots(1, 2, sharey=True)
     # a normal error of sd 1 has the median 0.674
     columns = (
@@ -45,42 +47,11 @@ def draw_past_rail(table: pd.DataFrame, rail_dps: float, footer=()):
         axes.set_title(title)
     panels[0].set_ylabel("error of the predicted reading (deg/s)")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    return figure
-
-
-CAUSES = (
-    Column("model", "model", "model"),
-    Column("rms_m", "pairs: rms (µm)", r"rms ($\mu$m)", "{:.1f}", 1e6),
-    Column("median_m", "median (µm)", r"median ($\mu$m)", "{:.1f}", 1e6),
-    Column("same_size_rms_m", "rms at one size (µm)", r"at one size ($\mu$m)", "{:.1f}", 1e6),
-    Column("size_sd", "sd of the size (%)", r"size (\%)", "{:.3f}", 100.0),
-    Column("covered", "95 % intervals cover (%)", r"covered (\%)", "{:.0f}", 100.0),
-    Column("residual_ratio", "residual / still noise", "residual", "{:.1f}"),
-    Column("smooth_ratio", "in smooth samples", "smooth", "{:.2f}"),
-    Column("nats", "nats a sample, held out", "nats", "{:.1f}"),
-    Column("nats_error", "± ", r"$\pm$", "{:.1f}"),
-)
 
 
 def table_causes(summary: pd.DataFrame, group: str):
     """Gain of each cause; ``summary``: `measured.causes.repeated` of the board ``group``."""
-    note = (
-        f"{summary.recordings.max()} recordings of board {group}; differences of all pairs, all"
-        " coordinates. Nats: what is new in a row gains on held-out time over the row that it"
-        " extends, median over recordings."
-    )
-    return summary, CAUSES, "How positions repeat, and what each cause gains", [note]
-
-
-EXPERIMENT = (
-    Column("samples", "T", "$T$", "{:d}"),
-    Column("model", "model", "model"),
-    Column("claimed_m", "claimed sd (µm)", r"claimed sd ($\mu$m)", "{:.1f}", 1e6),
-    Column("spread_m", "sd between recordings (µm)", r"between ($\mu$m)", "{:.1f}", 1e6),
-    Column("coverage_50", "50 % intervals hold (%)", r"50 \%", "{:.0f}", 100.0),
-    Column("coverage_95", "95 % intervals hold (%)", r"95 \%", "{:.0f}", 100.0),
-    Column("z_rms", "rms of z", "rms of $z$", "{:.2f}"),
-)
+    return summary, {"recordings": summary.recordings.max(), "group": group}
 
 
 def table_experiment(located: list, names: list[str], summary: pd.DataFrame, group: str):
@@ -105,25 +76,8 @@ def table_experiment(located: list, names: list[str], summary: pd.DataFrame, gro
         found = agreement(pairwise(table), table)
         rows.append(pd.DataFrame([found | {"samples": int(each), "model": "sensors"}]))
     table = pd.concat(rows, ignore_index=True).sort_values("samples", kind="stable")
-    note = (
-        f"{table.recordings.max()} recordings of board {group}; sds are rms over coordinates,"
-        " shares and z of the differences of all pairs. Sensors: maps, delays and lever arms from"
-        " the board's other recordings, biases and clocks from the whole recording, positions from"
-        " T samples."
-    )
-    table = table[[column.name for column in EXPERIMENT]]
-    return table, EXPERIMENT, "Table II of 2021 once more: sds of the positions, measured", [note]
-
-
-PAST_RAIL = (
-    Column("recording", "recording", "recording"),
-    Column("rate_dps", "rate (deg/s)", "rate (deg/s)", "{:.0f}"),
-    Column("readings", "readings", "readings", "{:d}"),
-    Column("median_dps", "median error (deg/s)", "median (deg/s)", "{:.1f}"),
-    Column("rmse_dps", "rms (deg/s)", "rms (deg/s)", "{:.0f}"),
-    Column("within_95", "95 % intervals hold (%)", r"covered (\%)", "{:.0f}", 100.0),
-    Column("above_100", "beyond 100 deg/s (%)", r"far (\%)", "{:.1f}", 100.0),
-)
+    words = {"recordings": table.recordings.max(), "group": group}
+    return table[[column.name for column in columns("experiment")]], words
 
 
 def table_past_rail(tables: list[pd.DataFrame], names: list[str], group: str):
@@ -132,23 +86,7 @@ def table_past_rail(tables: list[pd.DataFrame], names: list[str], group: str):
         table[table.model == "board"].assign(recording=name)
         for name, table in zip(names, tables, strict=True)
     ]
-    note = (
-        f"Board {group}: its parameters from the other recordings; biases, clocks, noise and motion"
-        " fitted to the recording without the withheld readings. Readings: of all gyroscopes."
-    )
-    return pd.concat(parts), PAST_RAIL, "Gyroscope readings past a made-up rail", [note]
-
-
-LEFT_OUT = (
-    Column("recording", "recording", "recording"),
-    Column("samples", "samples", "samples", "{:d}"),
-    Column("heavy", "papers' model, Student's t", "papers', t", "{:.1f}"),
-    Column("heavy_error", "±", r"$\pm$", "{:.1f}"),
-    Column("board", "board of the others", "board of the others", "{:.1f}"),
-    Column("board_error", "±", r"$\pm$", "{:.1f}"),
-    Column("beyond", "own fit beyond that", "own fit beyond", "{:.2f}"),
-    Column("beyond_error", "±", r"$\pm$", "{:.2f}"),
-)
+    return pd.concat(parts), {"group": group}
 
 
 def table_left_out(tables: list[pd.DataFrame], names: list[str], group: str):
@@ -162,13 +100,7 @@ def table_left_out(tables: list[pd.DataFrame], names: list[str], group: str):
             "board": by.over_inflated.board, "board_error": by.over_inflated_error.board,
             "beyond": by.over_board.own, "beyond_error": by.over_board_error.own,
         })  # fmt: skip
-    note = (
-        f"Board {group}: its parameters from the other recordings; biases, clocks, noise and motion"
-        " fitted to the recording. Nats a sample on held-out blocks of time over the papers' model"
-        " with normal noise as large as the residual, positions fitted to the recording; ± standard"
-        " error between blocks. Last: what a fit of all parameters to the recording has beyond."
-    )
-    return pd.DataFrame(rows), LEFT_OUT, "Recordings predicted by the others", [note]
+    return pd.DataFrame(rows), {"group": group}
 
 
 def positions_agreement(documents: dict[str, dict]) -> pd.DataFrame:

@@ -1,13 +1,11 @@
 """The criticism in one picture: what is wrong, why, the model extended, and what that gains."""
 
-from functools import partial
-
 import numpy as np
 import pandas as pd
 
 from imuarray.geometry import Array
-from imuarray.pictures.style import BLACK, GREY, PAGE, logarithmic, new_figure, styled
-from imuarray_papers.figures.style import Column, marks, panels, rms
+from imuarray.pictures.style import BLACK, GREY, PAGE, logarithmic
+from imuarray_papers.figures.style import columns, drawing, marks, panels, rms
 
 QUANTITIES = {"specific_force": "accelerometers", "angular_rate": "gyroscopes"}
 STEPS = {  # of `measured.causes.STEPS`
@@ -49,7 +47,7 @@ def figure_criticism(
         " shocks with them. (d) rms of differences between recordings, and the share of them that"
         " 95 % intervals cover; open: at one size; dashed: an error of the size that all share."
     ]
-    return partial(_draw, footer=footer), three_digits(table)
+    return drawing(_draw, footer, PAGE, 2.5), three_digits(table)
 
 
 def three_digits(table: pd.DataFrame) -> pd.DataFrame:
@@ -101,9 +99,7 @@ def estimated(cause: dict) -> tuple[np.ndarray, np.ndarray, set[str]]:
     return values, sds, {item["unit"] for item in items}
 
 
-@styled
-def _draw(table, footer):
-    figure = new_figure(footer, PAGE, 2.5)
+def _draw(figure, table):
     axes = figure.subplots(1, 4, width_ratios=(1.1, 1.1, 1, 1))
     part = dict(list(table.groupby("panel")))
     _draw_wrong(axes[0], part["wrong"])
@@ -111,7 +107,6 @@ def _draw(table, footer):
     _draw_extended(axes[2], part["extended"])
     _draw_between(axes[3], part["gained"], part["left_out"].set_index("model"))
     letter(axes)
-    return figure
 
 
 def letter(axes) -> None:
@@ -200,15 +195,6 @@ def _draw_between(axes, rows, left_out) -> None:
     draw_gained(axes, rows, said, "between recordings (µm)")
 
 
-CRITICISM = (
-    Column("question", "question", "question"),
-    Column("papers", "papers' model", "papers' model"),
-    Column("extended", "extended model", "extended model"),
-    Column("interval", "± or interval", r"$\pm$ or interval"),
-    Column("source", "from", "from"),
-)
-
-
 def table_criticism(
     summary: pd.DataFrame, noise: pd.DataFrame, diagnosis: tuple, causes: pd.DataFrame,
     predicted: pd.DataFrame, recordings: Array, name: str, group: str,
@@ -247,5 +233,5 @@ def table_criticism(
          f"size, common to all: {1e6 * last.common_size_m:.0f} µm rms; frame: up to"
          f" {turned:.0f} µm for 0.1 degree", several),
     )  # fmt: skip
-    table = pd.DataFrame(rows, columns=[column.name for column in CRITICISM])
-    return table, CRITICISM, "What the papers' model gets wrong on a real board", []
+    table = pd.DataFrame(rows, columns=[column.name for column in columns("criticism")])
+    return table, {}

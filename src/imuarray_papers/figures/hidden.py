@@ -1,16 +1,14 @@
 """Effects that were hidden in recordings: what was found, and what it is worth."""
 
-from functools import partial
-
 import numpy as np
 import pandas as pd
 
 from imuarray.geometry import Array
 from imuarray.model.effects import known_effect
-from imuarray.pictures.style import BLACK, PAGE, new_figure, styled
+from imuarray.pictures.style import BLACK, PAGE
 from imuarray_papers.blind.study import accuracy, classes
 from imuarray_papers.figures.criticism import draw_gained, estimated, letter, three_digits
-from imuarray_papers.figures.style import Column, marks, panels, rms
+from imuarray_papers.figures.style import drawing, marks, panels, rms
 
 MODELS = {"base": "papers'", "inflated": "noise inflated", "extended": "extended"}
 
@@ -49,7 +47,7 @@ def figure_criticism_hidden(diagnosis: tuple, truth: dict, recordings: Array):
         " positions take up. (d) rms error of the positions, and how many of the 95 % intervals"
         " hold the truth."
     ]
-    return partial(_draw_hidden, footer=footer), three_digits(table)
+    return drawing(_draw_hidden, footer, PAGE, 2.5), three_digits(table)
 
 
 def _arms(document: dict, truth: dict, turns) -> pd.DataFrame:
@@ -63,9 +61,7 @@ def _arms(document: dict, truth: dict, turns) -> pd.DataFrame:
     return pd.DataFrame({"found_m": both[0].ravel(), "true_m": both[1].ravel()})
 
 
-@styled
-def _draw_hidden(table, footer):
-    figure = new_figure(footer, PAGE, 2.5)
+def _draw_hidden(figure, table):
     axes = figure.subplots(1, 4)
     part = dict(list(table.groupby("panel")))
     sizes = part["wrong"].groupby("model").rms.max()
@@ -81,7 +77,6 @@ def _draw_hidden(table, footer):
     said = f"held out: +{gain:.1f} ± {error:.1f} nats"
     draw_gained(axes[3], part["gained"], said, "error of positions (µm)")
     letter(axes)
-    return figure
 
 
 def _draw_residuals(axes, rows) -> None:
@@ -101,16 +96,6 @@ def _draw_seen(axes, rows) -> None:
     axes.plot(ends, ends, color=BLACK, linewidth=0.8)
     axes.set(xlabel="predicted (noise sds)", ylabel="seen (noise sds)", title="Cause: lever arms")
     axes.legend(fontsize=6)
-
-
-HIDDEN = (
-    Column("recording", "recording", "recording"), Column("hidden", "hidden", "hidden"),
-    Column("sensors", "in IMU", "in IMU"), Column("named", "named", "named"),
-    Column("named_sensors", "in IMU", "in IMU"), Column("size", "size ± sd", r"size $\pm$ sd"),
-    Column("true_size", "true size", "true size"),
-    Column("gain", "gain, held out (nats)", "gain, held out (nats)"),
-    Column("control", "the same without it", "the same without it"),
-)  # fmt: skip
 
 
 def table_criticism_hidden(diagnoses: list, truths: list, controls: list, names: list):
@@ -137,12 +122,7 @@ def table_criticism_hidden(diagnoses: list, truths: list, controls: list, names:
             "gain": f"{mine[0]['heldout_gain_nats']:.3g}" if mine else "",
             "control": f"{len(before)} of its own, {too}" if before else "nothing",
         })  # fmt: skip
-    note = (
-        "Effect, IMU and size are drawn from the seed by code that shares nothing with the model;"
-        " the diagnosis sees the recording alone. Named: what the recording without the effect is"
-        " not said to have. Lever arms: with the means that no recording shows."
-    )
-    return pd.DataFrame(rows), HIDDEN, "Effects that were hidden, and what was found", [note]
+    return pd.DataFrame(rows), {}
 
 
 def _sizes(causes: list, hidden: dict) -> tuple[str, str]:

@@ -1,39 +1,12 @@
 """Measured recordings: agreement between them, first order, still noise."""
 
-from functools import partial
-
 import numpy as np
 import pandas as pd
 from scipy.special import ndtr
 
 from imuarray.pictures.noise import KINDS, deviation_lines
-from imuarray.pictures.style import BLACK, PAGE, logarithmic, look, new_figure, styled
-from imuarray_papers.figures.style import Column, panels, rms
-
-FIRST_ORDER = (
-    Column("recording", "recording", "recording"),
-    Column("triad", "IMU", "IMU"),
-    Column(
-        "residual_rms", "residual in still poses (mm/s²)", r"residual (mm/s$^2$)", "{:.2f}", 1e3
-    ),
-    Column("left_out", "poses left out", "left out"),
-    Column("force_sd", "accelerometer noise (mm/s²)", r"acc. (mm/s$^2$)", "{:.1f}", 1e3),
-    Column("force_ratio", "/ papers' σa", r"/ $\sigma_a$", "{:.2f}"),
-    Column("rate_sd", "gyroscope noise (deg/s)", "gyro. (deg/s)", "{:.3f}", float(np.degrees(1.0))),
-    Column("rate_ratio", "/ papers' σg", r"/ $\sigma_g$", "{:.2f}"),
-    Column("rate_correlation", "gyroscopes, neighbours' correlation", "corr.", "{:+.2f}"),
-)
-
-AGREEMENT = (
-    Column("samples", "T", "$T$"),
-    Column("assumed", "assumed σa", r"assumed $\sigma_a$"),
-    Column("accelerometer_sd", "its value (m/s²)", r"$\sigma_a$ (m/s$^2$)", "{:.2f}"),
-    Column("claimed_m", "claimed sd (µm)", r"claimed ($\mu$m)", "{:.3g}", 1e6),
-    Column("spread_m", "sd between recordings (µm)", r"between ($\mu$m)", "{:.3g}", 1e6),
-    Column("z_rms", "rms z", "rms $z$", "{:.2f}"),
-    Column("coverage_50", "50 % intervals cover (%)", r"50 \%", "{:.0f}", 100.0),
-    Column("coverage_95", "95 % intervals cover (%)", r"95 \%", "{:.0f}", 100.0),
-)
+from imuarray.pictures.style import BLACK, PAGE, logarithmic, look
+from imuarray_papers.figures.style import drawing, panels, rms
 
 
 def table_measured_first_order(residuals: list, noise: list, names: list[str]):
@@ -57,25 +30,12 @@ def table_measured_first_order(residuals: list, noise: list, names: list[str]):
                 entry |= {f"{short}_sd": sd, f"{short}_ratio": sd / part.declared.iloc[0]}
                 entry[f"{short}_correlation"] = part.correlation.mean()
             rows.append(entry)
-    table = pd.DataFrame(rows)
-    note = (
-        "Noise: root mean square over the axes, from differences of neighbouring readings in the"
-        " still poses, beside the noise the recording declared (the papers')."
-    )
-    columns = [column for column in FIRST_ORDER if column.name in table]
-    caption = "First-order calibration from still poses: residual and noise of each IMU"
-    return table, columns, caption, [note]
+    return pd.DataFrame(rows), {}
 
 
 def table_measured_agreement(summary: pd.DataFrame):
     """Coverage and z-scores between recordings of a board; ``summary``: `measured.agreement`."""
-    table = summary.astype({"assumed": str})
-    note = (
-        f"{table.recordings.max()} recordings, differences of all pairs in all coordinates. Pairs"
-        " share recordings and coordinates share a motion, so the shares have no simple error."
-    )
-    caption = "Do recordings of one board agree within their claimed widths?"
-    return table, AGREEMENT, caption, [note]
+    return summary.astype({"assumed": str}), {"recordings": summary.recordings.max()}
 
 
 def figure_measured_agreement(summary: pd.DataFrame, pairs: pd.DataFrame, group: str):
@@ -92,12 +52,10 @@ def figure_measured_agreement(summary: pd.DataFrame, pairs: pd.DataFrame, group:
     own = pairs.samples == summary.samples.max()
     pairs = pairs.loc[own, ["samples", "assumed", "z"]].round({"z": 2})  # differences, some tiny
     table = panels(summary=summary, pairs=pairs).astype({"assumed": str})
-    return partial(_draw_agreement, footer=footer), table
+    return drawing(_draw_agreement, footer, PAGE, 2.7), table
 
 
-@styled
-def _draw_agreement(table, footer):
-    figure = new_figure(footer, PAGE, 2.7)
+def _draw_agreement(figure, table):
     left, middle, right = figure.subplots(1, 3)
     pairs, summary = table[table.panel == "pairs"], table[table.panel == "summary"]
     most = summary.samples.max()
@@ -129,7 +87,6 @@ def _draw_agreement(table, footer):
     right.set(xscale="log", ylim=(0, 102), xlabel="samples $T$", ylabel="covered (%)",
               title="95 % intervals (filled)\nand 50 % intervals (open)")  # fmt: skip
     figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    return figure
 
 
 def figure_measured_noise(allan: pd.DataFrame, name: str, settings: dict):
@@ -147,15 +104,12 @@ def figure_measured_noise(allan: pd.DataFrame, name: str, settings: dict):
         f"Still poses of recording {name}. Black: the papers' σa ="
         f" {noise['accelerometer_sd']:g} m/s² and σg = {noise['gyroscope_sd_dps']:g} deg/s."
     ]
-    return partial(_draw_noise, papers=papers, footer=footer), allan
+    return drawing(_draw_noise, footer, PAGE, papers=papers), allan
 
 
-@styled
-def _draw_noise(allan, papers, footer):
-    figure = new_figure(footer, PAGE, 2.8)
+def _draw_noise(figure, allan, papers):
     for axes, sensor in zip(figure.subplots(1, 2), KINDS, strict=True):
         taus = deviation_lines(axes, allan, sensor)
         white = KINDS[sensor][0] * papers[sensor] * np.sqrt(taus[0] / taus)
         axes.plot(taus, white, color=BLACK, linewidth=1.2, label="papers' σ, white")
         axes.legend()
-    return figure

@@ -1,14 +1,12 @@
 """Paper 2017: what position errors do to the angular rate, and how well ML-BCD finds them."""
 
-from functools import partial
-
 import matplotlib
 import numpy as np
 import pandas as pd
 
 from imuarray.geometry import array_from_config
-from imuarray.pictures.style import BLACK, GREY, MARKERS, logarithmic, new_figure, styled
-from imuarray_papers.figures.style import legend_items, level, points, scale_line
+from imuarray.pictures.style import BLACK, GREY, MARKERS, logarithmic
+from imuarray_papers.figures.style import drawing, legend_items, level, points, scale_line
 
 MICROMETRE = 1e-6  # m, the level that the paper's conclusions speak of
 RATE = r"Angular rate $\|\omega\|$ (deg/s)"
@@ -35,7 +33,8 @@ def figure_2017_fig3(rates: pd.DataFrame, settings: dict):
     columns = ["series", "position_sd_m", "angular_rate_dps", "rmse_dps", "rmse_se_dps"]
     table = pd.concat([array, means, unsaturated], ignore_index=True)[columns]
     table.attrs["digits"] = {"rmse_dps": 4}
-    return partial(_draw_fig3, settings=settings, footer=_footer(rates, settings)), table
+    saturation = settings["paper2017"]["gyroscope_range_dps"]
+    return drawing(_draw_fig3, _footer(rates, settings), height=3.2, saturation=saturation), table
 
 
 def _gyroscopes_average(rates: pd.DataFrame) -> pd.DataFrame:
@@ -53,9 +52,7 @@ def _gyroscopes_average(rates: pd.DataFrame) -> pd.DataFrame:
     return means.assign(rmse_se_dps=np.sqrt(means.error / counts) / (2 * means.rmse_dps))
 
 
-@styled
-def _draw_fig3(table, settings, footer):
-    figure = new_figure(footer, height=3.2)
+def _draw_fig3(figure, table, saturation):
     axes = figure.subplots()
     array = table[table.series == "array"]
     for index, (sd, rows) in enumerate(array.groupby("position_sd_m", sort=False)):
@@ -68,7 +65,6 @@ def _draw_fig3(table, settings, footer):
     for label, (name, dashes) in averages.items():
         rows = table[table.series == name]
         axes.plot(rows.angular_rate_dps, rows.rmse_dps, color=BLACK, linestyle=dashes, label=label)
-    saturation = settings["paper2017"]["gyroscope_range_dps"]
     axes.axvline(saturation, color=GREY, linewidth=0.8)
     axes.annotate(
         f"saturation\n{saturation:g} deg/s", (saturation, 0.5),
@@ -77,7 +73,6 @@ def _draw_fig3(table, settings, footer):
     )  # fmt: skip
     logarithmic(axes, RATE, "RMSE of the angular rate (deg/s)")
     axes.legend(*legend_items(axes, averages), loc="upper left")
-    return figure
 
 
 def figure_2017_fig4(errors: pd.DataFrame, settings: dict):
@@ -98,12 +93,10 @@ def figure_2017_fig4(errors: pd.DataFrame, settings: dict):
     table = table.sort_values(["series", "iterations", "samples"], ignore_index=True)
     table = table[["series", "iterations", "samples", "rmse_m", "rmse_se_m"]]
     table.attrs["digits"] = {"rmse_m": 4}  # thousands of iterations enlarge what is rounded
-    return partial(_draw_fig4, footer=_footer(errors, settings)), table
+    return drawing(_draw_fig4, _footer(errors, settings), height=3.5), table
 
 
-@styled
-def _draw_fig4(table, footer):
-    figure = new_figure(footer, height=3.5)
+def _draw_fig4(figure, table):
     axes = figure.subplots()
     groups = list(table[table.series == "bcd"].groupby("iterations"))
     # one hue would not do for ten lines; viridis runs evenly for every kind of eye
@@ -126,7 +119,6 @@ def _draw_fig4(table, footer):
         *legend_items(axes, [r"$N^{-1/2}$"]), loc="outside upper center", ncols=4,
         title="Iterations", title_fontsize=7,
     )  # fmt: skip
-    return figure
 
 
 def figure_2017_fig5(errors: pd.DataFrame, settings: dict):
@@ -140,12 +132,11 @@ def figure_2017_fig5(errors: pd.DataFrame, settings: dict):
     table = errors[columns].round({name: 6 for name in columns[:2]})
     table.attrs["digits"] = {"rmse_m": 4}
     footer = [*_footer(errors, settings), counts]
-    return partial(_draw_fig5, start=settings["paper2017"]["position_sd"], footer=footer), table
+    start = settings["paper2017"]["position_sd"]
+    return drawing(_draw_fig5, footer, height=3.0, start=start), table
 
 
-@styled
-def _draw_fig5(table, start, footer):
-    figure = new_figure(footer, height=3.0)
+def _draw_fig5(figure, table, start):
     axes = figure.subplots()
     for index, (value, rows) in enumerate(table.groupby("angular_acceleration_dps2")):
         label = f"{value:.0f}" if value < 1e4 else f"${_power(value)}$"
@@ -153,7 +144,6 @@ def _draw_fig5(table, start, footer):
     level(axes, start, r"start ($\sigma_r$)", color=GREY)
     logarithmic(axes, RATE, "RMSE of the positions (m)")
     axes.legend(loc="lower left", title=r"$\|\dot{\omega}\|$ (deg/s$^2$)", title_fontsize=7)
-    return figure
 
 
 def _power(value: float) -> str:

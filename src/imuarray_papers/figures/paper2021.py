@@ -1,16 +1,15 @@
 """Paper 2021: tuning, chains and posteriors. (Its array: `paper2021_array`.)"""
 
-from functools import partial
-
 import numpy as np
 import pandas as pd
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter
 from scipy.stats import gaussian_kde, norm
 
-from imuarray.pictures.style import BLACK, GREY, PAGE, SKY, logarithmic, look, new_figure, styled
+from imuarray.pictures.style import BLACK, GREY, PAGE, SKY, logarithmic, look
 from imuarray_papers.figures.style import (
     chain_lines,
+    drawing,
     legend_items,
     level,
     points,
@@ -38,12 +37,10 @@ def figure_2021_fig2(variances: list[pd.DataFrame], settings: dict):
     )
     footer = [scale_line(settings, f"{table.realisations.max()} realisations per point")]
     target = settings["paper2021"]["variance_target"]
-    return partial(_draw_fig2, target=target, footer=footer), table
+    return drawing(_draw_fig2, footer, height=2.9, target=target), table
 
 
-@styled
-def _draw_fig2(table, target, footer):
-    figure = new_figure(footer, height=2.9)
+def _draw_fig2(figure, table, target):
     axes = figure.subplots()
     for index, (samples, rows) in enumerate(table.groupby("samples")):
         alone = {"linestyle": "none", "label": f"$T = {samples}$"}
@@ -54,7 +51,6 @@ def _draw_fig2(table, target, footer):
     ylabel = r"Variance of $\log\,\hat{p}_N(y^{(a)}_{1:T}|\theta)$ (nat$^2$)"
     logarithmic(axes, "Monte Carlo samples $N$ (count)", ylabel)
     axes.legend(*legend_items(axes, [r"$\sim 1/N$"]), loc="lower left", ncols=2)
-    return figure
 
 
 def figure_2021_fig3(chains: list, verdict: list[dict], coordinates: list, settings: dict):
@@ -72,12 +68,10 @@ def figure_2021_fig3(chains: list, verdict: list[dict], coordinates: list, setti
     table.attrs["digits"] = {"value": 7, "low_um": 7, "high_um": 7}  # far from 0, and narrow
     footer = [scale_line(settings), *chain_lines({verdict["samples"]: verdict})]
     steps = verdict["burn_in_steps"]
-    return partial(_draw_fig3, burn_in_steps=steps, name=name, footer=footer), table
+    return drawing(_draw_fig3, footer, height=4.6, burn_in_steps=steps, name=name), table
 
 
-@styled
-def _draw_fig3(table, burn_in_steps, name, footer):
-    figure = new_figure(footer, height=4.6)
+def _draw_fig3(figure, table, burn_in_steps, name):
     mosaic = figure.subplot_mosaic(
         [["whole", "whole"], ["trace", "histogram"], ["correlation", "correlation"]],
         width_ratios=[4, 1], height_ratios=[1, 1.4, 1.2],
@@ -102,7 +96,6 @@ def _draw_fig3(table, burn_in_steps, name, footer):
     mosaic["trace"].set_xlabel("Step (count)")
     figure.align_ylabels()
     figure.legend(*legend_items(mosaic["whole"]), loc="outside upper center", ncols=4)
-    return figure
 
 
 def chain_panels(series, burn_in: int, thin: int, truth: float | None = None) -> pd.DataFrame:
@@ -208,12 +201,10 @@ def figure_2021_fig4(chains: list, verdicts: list[dict], coordinates: list, sett
     )  # fmt: skip
     name = f"IMU {chains[-1][1]['posterior']['accelerometer'].to_numpy()[0]}"
     footer = [scale_line(settings), *chain_lines(verdicts)]
-    return partial(_draw_fig4, name=name, footer=footer), table
+    return drawing(_draw_fig4, footer, PAGE, 4.9, name=name), table
 
 
-@styled
-def _draw_fig4(table, name, footer):
-    figure = new_figure(footer, PAGE, 4.9)
+def _draw_fig4(figure, table, name):
     panels = figure.subplots(3, 2, sharex="col", sharey=True)
     for letter, row, (axis, rows) in zip("abc", panels, table.groupby("axis"), strict=True):
         for axes in row:
@@ -239,7 +230,6 @@ def _draw_fig4(table, name, footer):
         handles.append(Line2D([], [], color=GREY, linestyle=_dashes(number)))
         labels.append(f"chain {number + 1}")
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
-    return figure
 
 
 def densities(posteriors: dict[int, np.ndarray], prior, truth) -> pd.DataFrame:
@@ -269,23 +259,20 @@ def densities(posteriors: dict[int, np.ndarray], prior, truth) -> pd.DataFrame:
 
 
 def _posteriors(axes, rows):
-    """Prior, posteriors and truth of one coordinate."""
-    names = [samples for samples in sorted(rows.samples.unique()) if samples > 0]
-    _density(axes, rows[rows.samples == 0], {"color": SKY, "linestyle": ":"}, "prior")
-    for index, samples in enumerate(names):
-        _density(axes, rows[rows.samples == samples], look(index, "linestyle"), f"$T = {samples}$")
+    """Prior, posteriors and truth of one coordinate.
+
+    The first chain is full and the others are dashed; the peak of all chains is at 1.
+    """
+    for index, (samples, some) in enumerate(rows.groupby("samples"), start=-1):
+        label = f"$T = {samples}$" if samples else "prior"
+        style = look(index, "linestyle") if samples else {"color": SKY, "linestyle": ":"}
+        for number, (_, one) in enumerate(some.groupby("chain")):
+            axes.plot(
+                one.deviation_um, one.density_per_um / some.density_per_um.max(),
+                label=label if number == 0 else None, markevery=(8 * number, 16), markersize=3,
+                markerfacecolor="none", **({"linestyle": _dashes(number)} | style),
+            )  # fmt: skip
     axes.axvline(0, **TRUTH)
-
-
-def _density(axes, rows, style, label):
-    """The chains of one posterior, the first one full and the others dashed; common peak 1."""
-    peak = rows.density_per_um.max()
-    for number, (_, one) in enumerate(rows.groupby("chain")):
-        axes.plot(
-            one.deviation_um, one.density_per_um / peak, label=label if number == 0 else None,
-            markevery=(8 * number, 16), markersize=3, markerfacecolor="none",
-            **({"linestyle": _dashes(number)} | style),
-        )  # fmt: skip
 
 
 def _dashes(number: int):

@@ -1,7 +1,5 @@
 """Figure 2 of 2017, 1 and 5 of 2021: the array, and where in its package each triad is."""
 
-from functools import partial
-
 import numpy as np
 import pandas as pd
 import xarray as xr
@@ -10,19 +8,9 @@ from matplotlib.patches import Rectangle
 from scipy.stats import chi2
 
 from imuarray.geometry import UNDERSIDE_ROTATION, Array, array_from_config
-from imuarray.pictures.style import (
-    BLACK,
-    BLUE,
-    GREY,
-    PAGE,
-    SKY,
-    VERMILLION,
-    look,
-    new_figure,
-    styled,
-)
+from imuarray.pictures.style import BLACK, BLUE, GREY, PAGE, SKY, VERMILLION, look
 from imuarray_papers.figures.paper2021 import after_burn_in, prior_of
-from imuarray_papers.figures.style import chain_lines, scale_line
+from imuarray_papers.figures.style import chain_lines, drawing, scale_line
 
 # The orientation marker in a topside package, in units of the package's sides. The text does
 # not say in which corner it is; on the axis that the underside is turned around, as here, both
@@ -40,34 +28,32 @@ def layout_table(array: Array) -> pd.DataFrame:
     under = height < (height.min() + height.max()) / 2 - 1e-9
     turn = np.where(under[:, None, None], UNDERSIDE_ROTATION, np.eye(3))
     marker = turn @ (MARKER * np.array(array.package))
-    table = pd.DataFrame({"accelerometer": array.labels})
-    table["side"] = np.where(under, "underside", "topside")
-    for name, values in (
-        ("", array.positions), ("relative_", array.relative),
-        ("marker_", array.positions + marker),
-    ):  # fmt: skip
-        for axis, column in zip("xyz", values.T, strict=True):
-            table[f"{name}{axis}_m"] = column
-    for axis, length in zip(("length", "width", "height"), array.package, strict=True):
-        table[f"package_{axis}_m"] = length
-    return table
+    places = np.hstack([array.positions, array.relative, array.positions + marker])
+    names = [f"{part}{axis}_m" for part in ("", "relative_", "marker_") for axis in "xyz"]
+    table = pd.DataFrame(places, columns=names)
+    table.insert(0, "accelerometer", array.labels)
+    table.insert(1, "side", np.where(under, "underside", "topside"))
+    sizes = ("package_length_m", "package_width_m", "package_height_m")
+    return table.assign(**dict(zip(sizes, array.package, strict=True)))
 
 
-def figure_2021_fig1(settings: dict, draw=None):
+def figure_2021_fig1(settings: dict):
     """Layout and dimensions: top view (y axis downwards) with numbers and pitch, and side view."""
-    array = array_from_config(settings["array"])
-    footer = [scale_line(settings, f"array {array.name}, nominal")]
-    return partial(draw or _draw_fig1, footer=footer), layout_table(array)
+    return _nominal(settings, _draw_fig1, 4.0)
 
 
 def figure_2017_fig2(settings: dict):
     """The array of the simulations, seen obliquely; crosses: where its sensing elements are."""
-    return figure_2021_fig1(settings, _draw_oblique)
+    return _nominal(settings, _draw_oblique, 2.9)
 
 
-@styled
-def _draw_oblique(table, footer):
-    figure = new_figure(footer, height=2.9)
+def _nominal(settings: dict, draw, height: float):
+    array = array_from_config(settings["array"])
+    footer = [scale_line(settings, f"array {array.name}, nominal")]
+    return drawing(draw, footer, height=height), layout_table(array)
+
+
+def _draw_oblique(figure, table):
     axes = figure.subplots()
     mm = 1e3 * table.filter(regex="_m$")
     size = mm[["package_length_m", "package_width_m"]].iloc[0].to_numpy()
@@ -91,16 +77,12 @@ def _draw_oblique(table, footer):
     axes.set_title(f"{(~under).sum()} IMUs on the topside (solid), {under.sum()} on the underside;"
                    f" height × {OBLIQUE[2, 1]:g}", size=7)  # fmt: skip
     axes.axis("off")
-    return figure
 
 
-@styled
-def _draw_fig1(table, footer):
-    figure = new_figure(footer, height=4.0)
+def _draw_fig1(figure, table):
     top, side = figure.subplots(2, 1, height_ratios=[6.2, 1], sharex=True)
     _top_view(top, table)
     _side_view(side, table)
-    return figure
 
 
 def _top_view(axes, table):
@@ -215,28 +197,26 @@ def figure_experiment(located: xr.Dataset, recordings: list, name: str, settings
 def _ellipses(table: pd.DataFrame, array: Array, settings: dict, footer: list[str], title: str):
     level = settings["experiment"]["ellipse_level"]
     table.attrs["digits"] = {"mean_x_mm": 6, "mean_y_mm": 6}  # far from 0, and narrow
-    return partial(_draw_ellipses, array=array, level=level, footer=footer, title=title), table
+    given = {"layout": layout_table(array), "level": level, "title": title}
+    return drawing(_draw_ellipses, footer, PAGE, 6.6, **given), table
 
 
-@styled
-def _draw_ellipses(table: pd.DataFrame, array: Array, level: float, footer: list[str], title: str):
+def _draw_ellipses(figure, table: pd.DataFrame, layout: pd.DataFrame, level: float, title: str):
     """Both sides of the board with the ellipses of `ellipse_table`, and all packages enlarged."""
-    figure = new_figure(footer, PAGE, 6.6)
     mosaic = figure.subplot_mosaic(
         [["topside", "underside"], ["top zoom", "under zoom"], ["legend", "legend"]],
         height_ratios=[3.3, 2.2, 0.2],
     )  # fmt: skip
     names = sorted(samples for samples in table.samples.unique() if samples > 0)
-    reference = layout_table(array).iloc[0]
+    reach = 1e3 * layout[["x_m", "y_m"]].abs().to_numpy().max() + 4.4
     for letter, side, zoom in (("a", "topside", "top zoom"), ("b", "underside", "under zoom")):
         axes, rows = mosaic[side], table[table.side == side]
-        _packages(axes, rows, array, reference if side == reference.side else None)
+        _packages(axes, layout[layout.side == side])
         for row in rows.itertuples():
             style = _style(names, row.samples)
             axes.plot(*ellipse(row, level).T, linewidth=0.8, **style)
             if row.samples > 0:
                 axes.plot(row.mean_x_mm, row.mean_y_mm, ".", color=style["color"], markersize=1.5)
-        reach = 1e3 * np.abs(array.positions[:, :2]).max() + 4.4
         axes.set(
             aspect="equal", xlabel="x (mm)", ylabel="y (mm), downwards", xlim=(-reach, reach),
             ylim=(reach, -reach), title=f"({letter}) {side}, seen from above",
@@ -247,7 +227,6 @@ def _draw_ellipses(table: pd.DataFrame, array: Array, level: float, footer: list
     mosaic["legend"].axis("off")
     mosaic["legend"].legend(handles=_handles(names, level, table), loc="center", ncols=7)
     figure.suptitle(title, size=8, weight="bold")
-    return figure
 
 
 def _moments_of(draws) -> tuple[np.ndarray, np.ndarray]:
@@ -319,22 +298,19 @@ def _style(names, samples) -> dict:
     return look(names.index(samples), "marker")
 
 
-def _packages(axes, rows, array, reference):
+def _packages(axes, layout):
     """Dashed outlines and quadrants, orientation markers and numbers; the reference as a star."""
-    length, width = 1e3 * array.package[0], 1e3 * array.package[1]
     dashes = {"linestyle": (0, (3, 2)), "linewidth": 0.5}
-    centres = rows.drop_duplicates("accelerometer")
-    places = [(r.accelerometer, r.package_x_mm, r.package_y_mm, r.marker_x_mm, r.marker_y_mm)
-              for r in centres.itertuples()]  # fmt: skip
-    if reference is not None:
-        values = [1e3 * reference[f"{name}_m"] for name in ("x", "y", "marker_x", "marker_y")]
-        places.append((reference.accelerometer, *values))
-        axes.plot(*values[:2], "*", color=BLACK, markersize=6)
-    for label, x, y, marker_x, marker_y in places:
+    mm = 1e3 * layout.filter(regex="_m$")
+    if 0 in mm.index:
+        axes.plot(mm.x_m[0], mm.y_m[0], "*", color=BLACK, markersize=6)
+    for number in sorted(mm.index, key=lambda index: (index == 0, index)):  # the reference last
+        row, label = mm.loc[number], layout.accelerometer[number]
+        x, y, length, width = row[["x_m", "y_m", "package_length_m", "package_width_m"]]
         _rectangle(axes, x, y, length, width, facecolor="none", edgecolor=GREY, **dashes)
         axes.plot([x - length / 2, x + length / 2], [y, y], color=GREY, **dashes)
         axes.plot([x, x], [y - width / 2, y + width / 2], color=GREY, **dashes)
-        axes.plot(marker_x, marker_y, "o", color=BLACK, markersize=2.2)
+        axes.plot(row.marker_x_m, row.marker_y_m, "o", color=BLACK, markersize=2.2)
         # in the gap above the package: inside, ellipses would cross it
         axes.text(x - 0.5 * length, y - 0.53 * width, label, size=6.5, va="bottom", ha="left")
 

@@ -2,37 +2,7 @@
 
 import pandas as pd
 
-from imuarray_papers.figures.style import Column, scale_line, unfinished
-
-NOT_IN_TEXT = "The paper's values are not in the extracted text; these are ours."
-
-TABLE1 = (
-    Column("samples", "T", "$T$"),
-    Column("draws", "N", "$N$"),
-    Column("variance", "variance of log p-hat", r"$\mathrm{var}\log\hat p_N$", "{:.3f}"),
-    Column("step_length_m", "σq (µm)", r"$\sigma_q$ ($\mu$m)", "{:.3g}", 1e6),
-    Column("acceptance_1", "acceptance, chain 1", "acc. 1", "{:.3f}"),
-    Column("acceptance_2", "acceptance, chain 2", "acc. 2", "{:.3f}"),
-    Column("steps", "steps per chain", "steps"),
-    Column("burn_in_steps", "burn-in (steps)", "burn-in"),
-    Column("rhat_max", "max R-hat", r"max $\hat R$", "{:.3f}"),
-    Column("ess_min", "min ESS", "min ESS", "{:.0f}"),
-    Column("ess_median", "median ESS", "med. ESS", "{:.0f}"),
-)
-
-TABLE2 = (
-    Column("samples", "T", "$T$"),
-    Column("source", "data", "data"),
-    Column("accelerometer_sd", "assumed σa (m/s²)", r"$\sigma_a$ (m/s$^2$)", "{:g}"),
-    Column("sd_x_m", "sd x (µm)", r"$x$ ($\mu$m)", "{:.3g}", 1e6),
-    Column("sd_y_m", "sd y (µm)", r"$y$ ($\mu$m)", "{:.3g}", 1e6),
-    Column("sd_z_m", "sd z (µm)", r"$z$ ($\mu$m)", "{:.3g}", 1e6),
-    Column("sd_median_m", "sd, median of all (µm)", r"median ($\mu$m)", "{:.3g}", 1e6),
-    Column("sd_mean_m", "sd, mean of all (µm)", r"mean ($\mu$m)", "{:.3g}", 1e6),
-    Column("ratio", "median / that of section IV-A", "ratio", "{:.3g}"),
-    Column("rhat_max", "max R-hat", r"max $\hat R$", "{:.3f}"),
-    Column("ess_min", "min ESS", "min ESS", "{:.0f}"),
-)
+from imuarray_papers.figures.style import columns, scale_line, unfinished
 
 
 def table_2021_table1(tunings: list[dict], verdicts: list[dict], settings: dict):
@@ -46,10 +16,8 @@ def table_2021_table1(tunings: list[dict], verdicts: list[dict], settings: dict)
         shares = enumerate(verdict["acceptance"], start=1)
         row = {f"acceptance_{number}": share for number, share in shares}
         rows.append(row | verdict | tuning)
-    table = pd.DataFrame(rows)[[column.name for column in TABLE1] + ["converged"]]
-    threshold = settings["paper2021"]["rhat_threshold"]
-    notes = [NOT_IN_TEXT, *unfinished(table, threshold), scale_line(settings) + "."]
-    return table, TABLE1, "Table I of 2021: values for the tuning parameters", notes
+    table = pd.DataFrame(rows)[[column.name for column in columns("2021_table1")] + ["converged"]]
+    return table, _chains(table, settings)
 
 
 def table_2021_table2(experiment: list, simulation: list, ideal: list, settings: dict):
@@ -79,9 +47,10 @@ def table_2021_table2(experiment: list, simulation: list, ideal: list, settings:
     table = pd.DataFrame(rows)
     counts = table.groupby("source", sort=False).accelerometers.first()
     sizes = ", ".join(f"{count} ({name})" for name, count in counts.items())
-    notes = [
-        f"Experiment: recording {settings['experiment']['recording']}. {NOT_IN_TEXT}",
-        f"IMUs: {sizes}.",
-        *unfinished(table, settings["paper2021"]["rhat_threshold"]), scale_line(settings) + ".",
-    ]  # fmt: skip
-    return table, TABLE2, "Table II of 2021: estimated standard deviations of the positions", notes
+    words = {"recording": settings["experiment"]["recording"], "sizes": sizes}
+    return table, words | _chains(table, settings)
+
+
+def _chains(table, settings: dict) -> dict:
+    threshold = settings["paper2021"]["rhat_threshold"]
+    return {"unfinished": unfinished(table, threshold), "scale": scale_line(settings)}

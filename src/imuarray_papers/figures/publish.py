@@ -2,6 +2,7 @@
 
 import inspect
 import json
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -33,9 +34,9 @@ def publish(snakemake) -> None:
     """Draw a figure (PDF, PNG, CSV) or make a table (CSV, LaTeX, Markdown) and write it.
 
     The rule's parameter ``by`` names a function of the package, such as "figures.measured.allan".
-    It gives (drawing function, table), or what `tables.write_table` takes if its name begins with
-    "table". It is given what it asks for by name: the rule's input files, read by `READERS`, its
-    parameters and its wildcards.
+    It gives (drawing function, table), or (table, words of its notes) if its name begins with
+    "table"; the rest of the name is its place in tables.yaml. It is given what it asks for by name:
+    the rule's input files, read by `READERS`, its parameters and its wildcards.
     """
     module, _, name = snakemake.params.by.rpartition(".")
     function = getattr(import_module(f"imuarray_papers.{module}"), name)
@@ -47,6 +48,7 @@ def publish(snakemake) -> None:
             files = [paths] if isinstance(paths, str) else paths
             read = [READERS.get(key, READERS.get(Path(path).suffix))(path) for path in files]
             given[key] = read[0] if isinstance(paths, str) else read
-    write = write_table if name.startswith("table") else write_figure
+    kind, _, own = name.partition("_")
+    write = partial(write_table, own) if kind == "table" else write_figure
     made = function(**{key: value for key, value in given.items() if key in wanted})
     write(*made, **dict(snakemake.output.items()))

@@ -3,15 +3,33 @@
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import yaml
 from matplotlib.figure import Figure
 
-from imuarray.pictures.style import look, saved
+from imuarray.pictures.style import COLUMN, look, new_figure, saved, styled
 from imuarray.provenance import write_bytes, write_csv
 
 DIGITS, ERROR_DIGITS = 5, 3  # significant, of a published number and of its standard error
+TABLES = yaml.safe_load(Path(__file__).with_name("tables.yaml").read_text(encoding="utf-8"))
+
+
+def drawing(draw: Callable, footer=(), width=COLUMN, height=2.8, **given) -> Callable:
+    """The function of a table that gives its figure, in inches, with ``footer`` lines below.
+
+    ``draw(figure, table, **given)`` fills the empty figure.
+    """
+
+    @styled
+    def drawn(table: pd.DataFrame) -> Figure:
+        figure = new_figure(footer, width, height)
+        draw(figure, table, **given)
+        return figure
+
+    return drawn
 
 
 def legend_items(axes, last=()):
@@ -118,11 +136,11 @@ def chain_lines(verdicts: dict[int, dict]) -> list[str]:
     return [*lines, last]
 
 
-def unfinished(table, threshold: float) -> list[str]:
-    """A note on the rows whose chains fail the criterion; none if there are no such rows."""
+def unfinished(table, threshold: float) -> str:
+    """A note on the rows whose chains fail the criterion; empty if there are no such rows."""
     failed = (~table.converged).sum()
     said = f"R-hat is not below {threshold:g} in {failed} of {len(table)} rows: preliminary."
-    return [said] if failed else []
+    return said if failed else ""
 
 
 @dataclass(frozen=True)
@@ -142,12 +160,27 @@ class Column:
         return self.form.format(value * self.factor if self.factor != 1.0 else value)
 
 
-def write_table(table, columns, caption: str, notes, csv, tex, md) -> None:
-    """``table``, `rounded`, as CSV; the ``columns`` of it as LaTeX and Markdown, with notes."""
-    table = rounded(table)
+def columns(name: str) -> list[Column]:
+    """The columns that readers see of the published table ``name``."""
+    return [Column(*given) for given in TABLES[name]["columns"]]
+
+
+def notes(name: str, words: dict) -> list[str]:
+    """The notes on the published table ``name``; none that is empty."""
+    filled = (note.format(**words) for note in TABLES[name].get("notes", ()))
+    return [note for note in filled if note]
+
+
+def write_table(name: str, table, words: dict, csv, tex, md) -> None:
+    """``table``, `rounded`, as CSV; those of its `columns` that it has as LaTeX and Markdown.
+
+    ``words`` of its `notes`.
+    """
+    table, caption, below = rounded(table), TABLES[name]["caption"], notes(name, words)
     write_csv(table, csv)
+    shown = [column for column in columns(name) if column.name in table]
     for path, form in ((tex, latex), (md, markdown)):
-        write_bytes(form(table, columns, caption, notes).encode(), path)
+        write_bytes(form(table, shown, caption, below).encode(), path)
 
 
 def _cells(table, columns) -> pd.DataFrame:

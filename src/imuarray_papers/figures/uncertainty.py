@@ -1,22 +1,13 @@
 """Figures and tables of estimation theory, and of the validation of posteriors by simulation."""
 
-from functools import partial
-
 import numpy as np
 import pandas as pd
 from scipy import stats
 
 from imuarray.pictures import style
-from imuarray_papers.figures.style import Column, marks, points, scale_line
+from imuarray_papers.figures.style import drawing, marks, points, scale_line
 
 ESTIMATORS = ("maximum likelihood", "with the prior")
-RANKS = (
-    Column("case", "motion and geometry", "motion and geometry"),
-    Column("samples", "samples", "$N$"),
-    Column("unknowns", "unknowns", "unknowns"),
-    Column("rank", "rank of the information", "rank"),
-    Column("condition", "condition of what is seen", "condition", "{:.2g}"),
-)
 BINS = 20
 ACROSS = 4  # panels in a line
 SHARES = (0.5, 0.9, 0.95)
@@ -25,44 +16,10 @@ MIXED = 50  # independent draws of a posterior, of 199: fewer are a slow chain
 KEYS = ["setting", "method", "samples"]  # of a histogram, and a row
 WHOLE = ("size", "misfit")  # quantities that hang on all coordinates
 
-COVERAGE = (
-    Column("setting", "setting", "setting"), Column("method", "method", "method"),
-    Column("samples", "T", "$T$"), Column("replicates", "replicates", "replicates"),
-    Column("covered_50", "50 % intervals cover (%)", r"50 \%", "{:.1f}", 100.0),
-    Column("se_50", "±", r"$\pm$", "{:.1f}", 100.0),
-    Column("covered_90", "90 % (%)", r"90 \%", "{:.1f}", 100.0),
-    Column("se_90", "± ", r"$\pm$ ", "{:.1f}", 100.0),
-    Column("covered_95", "95 % (%)", r"95 \%", "{:.1f}", 100.0),
-    Column("se_95", "±  ", r"$\pm$  ", "{:.1f}", 100.0),
-    Column("shift_z", "z of the mean score", r"$z$, shift", "{:+.1f}"),
-    Column("width_z", "z of the mean squared score", r"$z$, width", "{:+.1f}"),
-    Column("size_z", "z, the array's size", r"$z$, size", "{:+.1f}"),
-    Column("misfit_z", "z, misfit of the data", r"$z$, misfit", "{:+.1f}"),
-    Column("p", "p of uniform ranks", "$p$", "{:.2g}"),
-    Column("none", "truths without intervals", "none"), Column("slow", "slow chains", "slow"),
-    Column("apart", "farthest from NUTS", "from NUTS", "{:.2f}"),
-)  # fmt: skip
-COVERAGE_NOTE = (
-    "Truths drawn from the prior, motion from its own, which the samplers know, but 'sample', which"
-    " is the command as it is: to it the noise and the motion's size are unknown (the paper's limit"
-    " of a flat motion prior cannot be simulated; docs/findings.md says what it does to the array's"
-    " size). ±: standard errors over replicates."
-    " Scores: normal quantiles of the truth's PIT value; a mean square above 1 (z > 0) means widths"
-    " too small."
-    " p: Kolmogorov and Smirnov's, the smallest of all quantities times their number."
-    " Slow: fewer than 50 of 199 kept draws are worth an independent one. Farthest from NUTS: the"
-    " largest rms difference between both methods' PIT values of one truth; 0.05 is chance."
-)
-
 
 def table_theory_ranks(rows: pd.DataFrame, settings: dict):
     """Rank of the information over N, motion and geometry; ``rows``: `studies.bound.ranks`."""
-    note = (
-        "Fisher information of the positions r_2 ... r_A with the motion unknown, scaled to a unit"
-        " diagonal. A rank below the number of unknowns: the positions cannot be identified."
-    )
-    caption = "Which motion and geometry tell the positions."
-    return rows, RANKS, caption, [note, scale_line(settings)]
+    return rows, {"scale": scale_line(settings)}
 
 
 def figure_theory_efficiency(rows: pd.DataFrame, settings: dict):
@@ -71,12 +28,10 @@ def figure_theory_efficiency(rows: pd.DataFrame, settings: dict):
     ``rows``: `studies.bound.efficiency` for the model's noise, then for others at one N.
     """
     footer = [scale_line(settings, f"{rows.realisations.max()} realisations per point")]
-    return partial(_draw_efficiency, footer=footer), rows
+    return drawing(_draw_efficiency, footer, height=5.4), rows
 
 
-@style.styled
-def _draw_efficiency(table, footer):
-    figure = style.new_figure(footer, height=5.4)
+def _draw_efficiency(figure, table):
     top, below, louder = figure.subplots(3, 1, height_ratios=[2, 1, 1])
     others = table[table.noise != 1.0]
     for index, name in enumerate(ESTIMATORS):
@@ -97,7 +52,6 @@ def _draw_efficiency(table, footer):
     counts = ", ".join(map(str, others.samples.unique()))
     louder.set(xscale="log", xlabel=f"Noise, times the sensors' own ($N$ = {counts})")
     top.legend(loc="upper right")
-    return figure
 
 
 def figure_theory_convergence(rows: pd.DataFrame, settings: dict):
@@ -109,12 +63,10 @@ def figure_theory_convergence(rows: pd.DataFrame, settings: dict):
     """
     footer = [scale_line(settings, f"N = {rows.samples.max()}")]
     nominal = settings["paper2017"]["position_sd"]
-    return partial(_draw_convergence, nominal_sd=nominal, footer=footer), rows
+    return drawing(_draw_convergence, footer, height=5.4, nominal_sd=nominal), rows
 
 
-@style.styled
-def _draw_convergence(table, nominal_sd, footer):
-    figure = style.new_figure(footer, height=5.4)
+def _draw_convergence(figure, table, nominal_sd):
     top, below = figure.subplots(2, 1)
     own = table[table.array == table.array.iloc[0]]
     for index, (acceleration, rows) in enumerate(own.groupby("angular_acceleration_dps2")):
@@ -145,7 +97,6 @@ def _draw_convergence(table, nominal_sd, footer):
     below.plot(ends, ends, color=style.BLACK, linewidth=0.8)
     style.logarithmic(below, "share of the error lost in an iteration, foreseen", "seen")
     below.legend(loc="upper left", title="other arrays", title_fontsize=7)
-    return figure
 
 
 def figure_theory_size(rows: pd.DataFrame, settings: dict):
@@ -154,12 +105,10 @@ def figure_theory_size(rows: pd.DataFrame, settings: dict):
     Both on one axis of lengths would hide that the one falls: two panels.
     """
     footer = [scale_line(settings, f"N = {settings['theory']['convergence_samples']}")]
-    return partial(_draw_size, footer=footer), rows
+    return drawing(_draw_size, footer, height=4.0), rows
 
 
-@style.styled
-def _draw_size(table, footer):
-    figure = style.new_figure(footer, height=4.0)
+def _draw_size(figure, table):
     top, below = figure.subplots(2, 1, sharex=True)
     top.plot(1e3 * table.extent_m, 1e6 * table.bound_m, markerfacecolor="none", **style.look(0))
     below.plot(1e3 * table.extent_m, 1e6 * table.relative, markerfacecolor="none", **style.look(2))
@@ -169,7 +118,6 @@ def _draw_size(table, footer):
     span = (middle * 10**-decades, middle * 10**decades)
     style.logarithmic(top, None, "bound (µm)", ylim=span)
     style.logarithmic(below, "size of the array, corner to corner (mm)", "bound / size (ppm)")
-    return figure
 
 
 def coverage(table: pd.DataFrame) -> pd.DataFrame:
@@ -225,9 +173,7 @@ def _mean_z(scores) -> float:
 
 def table_validation_coverage(pit_values: list[pd.DataFrame], settings: dict):
     """Share of intervals that hold the truth, by method and T; ``pit_values``: `studies.sbc`."""
-    table = coverage(pd.concat(pit_values))
-    notes = [COVERAGE_NOTE, scale_line(settings)]
-    return table, COVERAGE, "How often intervals hold the truth.", notes
+    return coverage(pd.concat(pit_values)), {"scale": scale_line(settings)}
 
 
 def histogram(values: pd.DataFrame) -> pd.DataFrame:
@@ -260,14 +206,13 @@ def figure_validation_ranks(pit_values: list[pd.DataFrame], settings: dict):
         scale_line(settings, "n: truths from the prior, those without intervals left out"),
         "Histograms of all positions' coordinates; band: 95 % for all bins of a panel together.",
     ]
-    return partial(_draw_ranks, footer=footer), table
+    lines = -(-table.groupby(KEYS).ngroups // ACROSS)
+    return drawing(_draw_ranks, footer, style.PAGE, 0.5 + 1.35 * lines), table
 
 
-@style.styled
-def _draw_ranks(table, footer):
+def _draw_ranks(figure, table):
     groups = list(table.groupby(["setting", "samples", "method"], sort=False))
     lines = -(-len(groups) // ACROSS)
-    figure = style.new_figure(footer, style.PAGE, 0.5 + 1.35 * lines)
     panels = figure.subplots(lines, ACROSS, sharex=True, sharey=True, squeeze=False)
     for ((setting, samples, method), rows), axes in zip(groups, panels.flat, strict=False):
         width = stats.norm.isf(0.025 / BINS) * rows.se.mean()
@@ -283,4 +228,3 @@ def _draw_ranks(table, footer):
     for axes in panels[-1]:
         axes.set_xlabel("posterior below the truth")
     panels[0, 0].set(xlim=(0, 1), ylim=(0, None))
-    return figure

@@ -101,17 +101,15 @@ def repeated(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
         size = wide @ mean / (mean @ mean)
         between, alike = pairwise(part), part.copy()
         alike["mean_m"] /= alike.recording.map(size)
-        each = part.groupby("recording")
+        each = part.groupby("recording").first()
+        medians = each[["residual_ratio", "smooth_ratio", "nats", "nats_error"]].median()
         rows.append({
             "step": step, "model": STEPS[step], "recordings": len(wide),
             "rms_m": _rms(between.difference_m), "median_m": between.difference_m.abs().median(),
             "same_size_rms_m": _rms(pairwise(alike).difference_m),
             "common_size_m": 2 * part.common_scale_sd.median() * _rms(mean),
             "size_sd": size.std(ddof=1), "covered": np.mean(between.z.abs() < 1.96),
-            "residual_ratio": each.residual_ratio.first().median(),
-            "smooth_ratio": each.smooth_ratio.first().median(),
-            "nats": each.nats.first().median(), "nats_error": each.nats_error.first().median(),
-            "converged": int(each.converged.first().sum()),
+            **medians, "converged": int(each.converged.sum()),
         })  # fmt: skip
     return pd.DataFrame(rows)
 

@@ -5,14 +5,15 @@ simulated from the fitted motion and positions, with that noise and the same rai
 likewise. Where the model holds, the two are alike.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
 from imuarray.engine.parameters import model_of
+from imuarray.estimation.identifiability import Calibration
 from imuarray.estimation.newton import calibrate_gauss_newton
-from imuarray.motion import Motion
+from imuarray.model.array_model import Prediction
 from imuarray.recording import Recording
 from imuarray.simulation.recordings import clip, measure
 from imuarray_papers.measured.positions import LIMIT
@@ -22,42 +23,28 @@ TOLERANCE = 0.05
 BINS = 8
 
 
-@dataclass(frozen=True)
-class Residuals:
-    """Standardised residuals of one fit: (T, A, 3), (T, G, 3), and the estimated motion.
+def fit_residuals(recording: Recording) -> tuple[Calibration, Prediction]:
+    """The papers' model with the declared noise, fitted to all samples; standardised residuals.
 
-    At a gyroscope's rail the residual is NaN. ``positions`` (A, 3) m.
+    At a gyroscope's rail a residual is NaN.
     """
-
-    specific_force: np.ndarray
-    angular_rate: np.ndarray
-    motion: Motion
-    positions: np.ndarray
-
-
-def fit_residuals(recording: Recording) -> Residuals:
-    """Fit the papers' model with the recording's declared noise to all its samples."""
     model, saturated = model_of(recording), recording.saturated_gyroscopes()
     found = calibrate_gauss_newton(
         model, recording.specific_force, recording.angular_rate, saturated=saturated,
         position_prior=(model.array.parameters, recording.position_prior_sd), tolerance=TOLERANCE,
         limit=LIMIT,
     )  # fmt: skip
-    motion = found.motion.motion
-    predicted = model.predict_many(motion, found.positions)
-    force = recording.specific_force - predicted.specific_force
-    rate = recording.angular_rate - predicted.angular_rate
-    return Residuals(
-        force / recording.accelerometer_noise_sd,
-        np.where(saturated, np.nan, rate / recording.gyroscope_noise_sd), motion, found.positions,
-    )  # fmt: skip
+    predicted = model.predict_many(found.motion.motion, found.positions)
+    force = (recording.specific_force - predicted.specific_force) / recording.accelerometer_noise_sd
+    rate = (recording.angular_rate - predicted.angular_rate) / recording.gyroscope_noise_sd
+    return found, Prediction(force, np.where(saturated, np.nan, rate))
 
 
-def simulate_like(recording: Recording, fit: Residuals, rng) -> Recording:
+def simulate_like(recording: Recording, fit: Calibration, rng) -> Recording:
     """The recording as the papers' model would have given it, with its rails and noise."""
     model = model_of(recording)
     force, rate, _ = measure(
-        model, fit.motion, fit.positions, rng, gyroscope_range=recording.gyroscope_range
+        model, fit.motion.motion, fit.positions, rng, gyroscope_range=recording.gyroscope_range
     )
     return replace(
         recording, specific_force=clip(force, recording.accelerometer_range)[0], angular_rate=rate,
@@ -66,18 +53,18 @@ def simulate_like(recording: Recording, fit: Residuals, rng) -> Recording:
     )  # fmt: skip
 
 
-def residual_summary(fit: Residuals, recording: Recording, source: str) -> pd.DataFrame:
+def residual_summary(fit: Calibration, residuals: Prediction, recording: Recording, source: str):
     """Rms of each triad's residuals, in sigmas, in bins of |omega_dot|.
 
     Rows have source, quantity, triad, bin_low, bin_high (rad/s^2), rms.
     """
-    size = np.linalg.norm(fit.motion.angular_acceleration, axis=1)
+    size = np.linalg.norm(fit.motion.motion.angular_acceleration, axis=1)
     edges, rows = np.quantile(size, np.linspace(0, 1, BINS + 1)), []
     place = np.clip(np.searchsorted(edges, size, side="right") - 1, 0, BINS - 1)
     for quantity, kind in (("specific_force", "accelerometer"), ("angular_rate", "gyroscope")):
         for k, label in enumerate(getattr(recording, f"{kind}_labels")):
             for b in range(BINS):
-                values = getattr(fit, quantity)[place == b, k]
+                values = getattr(residuals, quantity)[place == b, k]
                 values = values[np.isfinite(values)]
                 rms = np.sqrt(np.mean(values**2)) if values.size else np.nan
                 rows.append((source, quantity, label, edges[b], edges[b + 1], rms))
@@ -87,8 +74,8 @@ def residual_summary(fit: Residuals, recording: Recording, source: str) -> pd.Da
 
 def compare(recording: Recording, rng) -> pd.DataFrame:
     """`residual_summary` of the recording and of its simulation."""
-    fit = fit_residuals(recording)
+    fit, residuals = fit_residuals(recording)
     simulated = simulate_like(recording, fit, rng)
-    measured = residual_summary(fit, recording, "measured")
-    again = residual_summary(fit_residuals(simulated), simulated, "simulated")
+    measured = residual_summary(fit, residuals, recording, "measured")
+    again = residual_summary(*fit_residuals(simulated), simulated, "simulated")
     return pd.concat([measured, again], ignore_index=True)

@@ -94,10 +94,10 @@ class Recordings:
 
     def causes(self) -> list[str]:
         """Files on each cause's gain on boards of several recordings, and the experiment anew."""
-        folder, groups = "results/measured", self.groups()
+        folder = "results/measured"
         tables = ("causes_table", "experiment_table", "left_out", "past_rail_table")
-        paths = [f"{folder}/tables/{name}_{group}.md" for name in tables for group in groups]
-        if any(self.shown in self.board(group) for group in groups):
+        paths = [f"{folder}/tables/{name}_{group}.md" for name in tables for group in self.groups()]
+        if self.is_criticised:
             paths += [f"{folder}/figures/experiment_{self.shown}.{kind}" for kind in FIGURE]
         return paths
 
