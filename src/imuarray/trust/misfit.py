@@ -167,10 +167,9 @@ def of_first_order(found: FirstOrder) -> Poses:
     """From the answer."""
     common = None if found.gyroscopes is None else found.gyroscopes.common
     scale = np.nan if common is None or isinstance(common, str) else common.scale
-    fit, follow = found.triads, [getattr(found, f"{kind}_smoothing") for kind in KINDS]
-    return _poses(
-        fit.residual_ratio, fit.residual, fit.relied, scale, found.gyroscope_matrix, follow
-    )
+    fit, follow = found.triads, [own.smoothing for own in found.at_rest.values()]
+    maps = found.maps["gyroscope"]
+    return _poses(fit.residual_ratio, fit.residual, fit.relied, scale, maps, follow)
 
 
 def of_file(path) -> Poses:
