@@ -89,7 +89,7 @@ class GenericTarget:
     def log_target(self, theta, rng) -> float:
         """log prior + log p-hat."""
         away = theta - self.prior.mean
-        root = getattr(self.prior, "root", np.diag(1.0 / self.prior.sd))
+        root = np.diag(1.0 / self.prior.sd) if self.prior.root is None else self.prior.root
         return self.estimate(theta, rng) - 0.5 * float(np.sum((root @ away) ** 2))
 
     def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:

@@ -49,6 +49,12 @@ def scaled_square(matrix, vector, cutoff: float, scale=None) -> tuple[float, int
     return float(np.sum(along**2 / values[informed])), int(informed.sum())
 
 
+def diagonal_blocks(matrix, size: int) -> np.ndarray:
+    """(k, size, size), the blocks on the diagonal of a matrix (k size, k size)."""
+    count = len(matrix) // size
+    return matrix.reshape(count, size, count, size)[range(count), :, range(count)]
+
+
 def shared_walk(time) -> np.ndarray:
     """(P, P) s, how long a walk both ways from time 0 is the same at each two of ``time`` (P,)."""
     return np.where(np.multiply.outer(time, time) > 0, np.minimum.outer(abs(time), abs(time)), 0.0)

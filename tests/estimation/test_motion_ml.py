@@ -142,7 +142,7 @@ def test_all_samples_together_are_each_alone(accelerometers, limit):
     saturated[::2] = True  # nothing but accelerometers: steps have to be damped
     data = Collapsed.of(model, force, rate, saturated)
     reduced, _ = data.reduce(model.array.relative)
-    given = reduced.C, reduced.b, data.mean, data.gyroscope_information, 1e-10
+    given = reduced.C, reduced.b, data.mean, data.rate_information, 1e-10
     together, cost, counts = data.mean.copy(), np.empty(400), np.empty(400, np.int64)
     rates.angular_rates(together, *given, limit, cost, counts)
     alone, price, steps = data.mean.copy(), np.empty(400), np.empty(400, np.int64)
@@ -166,6 +166,6 @@ def test_what_is_not_finite_is_not_found():
     C, b = reduced.C, reduced.b
     b[:, 3], b[:, 5] = np.nan, np.inf
     found, cost, counts = data.mean.copy(), np.empty(12), np.empty(12, np.int64)
-    rates.angular_rates(found, C, b, data.mean, data.gyroscope_information, 1e-10, 50, cost, counts)
+    rates.angular_rates(found, C, b, data.mean, data.rate_information, 1e-10, 50, cost, counts)
     assert counts[3] < 0 and counts[5] < 0
     assert np.all(np.delete(counts, [3, 5]) > 0)

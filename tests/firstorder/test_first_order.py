@@ -269,7 +269,7 @@ def test_a_jumping_offset_is_left_out_where_it_jumps():
     expected[:2, 2] = False
     np.testing.assert_array_equal(found.used, expected)
     np.testing.assert_allclose(found.matrix, matrix, atol=2e-3)
-    assert found.residual_rms[2] < 2e-3 < found.residual_rms_all[2]
+    assert found.residual_rms[2] < 2e-3 < np.sqrt(np.mean(found.residual[:, 2] ** 2))
 
 
 @pytest.mark.parametrize("count", [3, 5])
@@ -322,7 +322,7 @@ def test_corrected_readings_have_gravitys_size_and_keep_their_rails(tmp_path):
         mean = done.specific_force[pose].mean(axis=0)
         # sd of a mean of at least 200 readings: 3 mm/s^2; 6 of them, and the calibration's own
         np.testing.assert_allclose(mean, np.tile(GRAVITY * direction, (4, 1)), atol=0.025)
-    np.testing.assert_allclose(found.gyroscope_offset, bias, atol=6e-4)
+    np.testing.assert_allclose(found.at_rest["gyroscope"].offset, bias, atol=6e-4)
     write_recording(done, tmp_path / "done.nc")
     again = read_recording(tmp_path / "done.nc")
     assert np.argwhere(again.saturated_accelerometers()).tolist() == [[320, 1, 2]]
@@ -417,9 +417,9 @@ def test_a_dead_band_says_nothing_of_noise():
     recording, _, _, bias, *_ = board(np.random.default_rng(3))
     rate = recording.angular_rate - bias
     dead = replace(recording, angular_rate=np.where(np.abs(rate) < 0.02, 0.0, rate))
-    found = calibrate_first_order(dead, GRAVITY)
-    assert np.all(found.gyroscope_noise == recording.gyroscope_noise_sd)
-    assert not np.any(found.gyroscope_smoothing) and not np.any(found.gyroscope_correlation)
+    rates = calibrate_first_order(dead, GRAVITY).at_rest["gyroscope"]
+    assert np.all(rates.noise == recording.gyroscope_noise_sd)
+    assert not np.any(rates.smoothing) and not np.any(rates.correlation)
 
 
 def test_gravity_that_was_taken_out_is_named():

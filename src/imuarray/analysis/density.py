@@ -23,13 +23,14 @@ from imuarray.engine.parameters import model_of
 from imuarray.engine.readings import Readings
 from imuarray.engine.widths import priors_of
 from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.newton import apart
 from imuarray.geometry import positions_of
 from imuarray.linear import scaled_inverse
 from imuarray.model import ArrayModel
 from imuarray.model.effects import KINDS
 from imuarray.posterior.generic import SCALES, log_laplace, unknown
 from imuarray.posterior.marginal import Marginal, log_posterior
-from imuarray.posterior.prior import GaussianPrior, TiedPrior
+from imuarray.posterior.prior import GaussianPrior
 from imuarray.recording import Recording
 
 NOT_CONVERGED = (
@@ -106,7 +107,7 @@ def posterior_beyond(recording: Recording, found: Estimate, notify: Notify = sil
         motion = np.hstack([motion, *one.state.jerk])
     return Posterior(
         recording, model,
-        TiedPrior.of(
+        GaussianPrior.tied(
             np.append(mean, before), block_diag(root, np.eye(len(SCALES)) / SETTINGS.wide)
         ),
         np.concatenate([mode, [0.0, 0.0], own]),
@@ -180,7 +181,7 @@ def traced(posterior: Posterior, notify: Notify = silent):
     prior = posterior.prior
     # (5, K) from the unknown logs to those of `SCALES`
     spread = np.eye(len(SCALES))[:, [SCALES.index(name) for name in posterior.scales]]
-    if isinstance(prior, TiedPrior):
+    if prior.root is not None:
         assert posterior.readings is not None  # there are, with effects
         given = unknown(posterior.readings, posterior.motion, spread)
         return log_extended(posterior.model), (given, prior.mean, prior.root)
@@ -189,13 +190,11 @@ def traced(posterior: Posterior, notify: Notify = silent):
     collapsed = Collapsed.of(
         posterior.model, recording.specific_force, recording.angular_rate, saturated
     )
-    own = collapsed.mean.T[:, None]
-    nothing = np.zeros((len(own), 3 * posterior.model.array.accelerometers))
-    apart = posterior.model.noise.misfit(nothing, recording.angular_rate - own, saturated)
+    chi_square = apart(posterior.model, collapsed, recording.angular_rate, saturated)
     size = 3 * (posterior.model.array.accelerometers - 1)
     found = Marginal.of(
         collapsed, positions_of(posterior.mode[:size]), motion_sd=posterior.model.motion_sd[:2],
-        spread=(apart, saturated.size - saturated.sum()), enough=SETTINGS.node_gap,
+        spread=(chi_square, saturated.size - saturated.sum()), enough=SETTINGS.node_gap,
     )  # fmt: skip
     if found.gap > SETTINGS.node_gap:
         notify("gyroscopes that see little of the motion: the likelihood is good to"

@@ -13,8 +13,8 @@ from imuarray.engine.clocks import CLOCK
 from imuarray.engine.fusion import COMPONENTS, fuse
 from imuarray.engine.parameters import model_of
 from imuarray.errors import InputError, require
-from imuarray.firstorder.correct import corrected
-from imuarray.firstorder.rails import less_leak, nearest_rail, rails_shown
+from imuarray.firstorder.correct import taken_out
+from imuarray.firstorder.rails import less_leak
 from imuarray.model import ArrayModel
 from imuarray.model.array_model import parameter_names
 from imuarray.model.effects import find_effects
@@ -88,15 +88,9 @@ def as_calibrated(recording: Recording, calibration: xr.Dataset) -> Recording:
     changed: dict[str, Any] = {
         name: calibration[name].to_numpy() if name in calibration else None for name in MATRICES
     }
-    for kind, name in KINDS.items():
+    for kind in KINDS:
         inverse, offset = (first[f"{kind}_{part}"].to_numpy() for part in ("inverse", "offset"))
-        railed = getattr(recording, f"saturated_{kind}s")()
-        limit = getattr(recording, f"{kind}_range")
-        changed |= {
-            name: corrected(inverse, offset, getattr(recording, name)),
-            f"{name}_saturated": rails_shown(inverse, railed),
-            f"{kind}_range": nearest_rail(limit, np.linalg.inv(inverse), offset),
-        }
+        changed |= taken_out(recording, kind, np.linalg.inv(inverse), inverse, offset)
     places = calibration["nominal_position"].to_numpy()
     return replace(recording, correction=first, accelerometer_position=places, **changed)
 

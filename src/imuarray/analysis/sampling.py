@@ -135,11 +135,11 @@ def _exact(
 def _key(posterior: Posterior, steps: int | None, seed: int, method: str) -> str:
     """Digest of everything that chains depend on."""
     recording, model, prior = posterior.recording, posterior.model, posterior.prior
-    used, root = posterior.readings, getattr(prior, "root", None)
+    used = posterior.readings
     return digest(
         recording.time, recording.specific_force, recording.angular_rate,
         recording.saturated_gyroscopes(), recording.accelerometer_position,
-        *(() if used is None else (used.time, used.values, used.weights, root)),
+        *(() if used is None else (used.time, used.values, used.weights, prior.root)),
         list(model.clock or ()), model.noise.accelerometer, model.noise.gyroscope,
         list(model.motion_sd), list(model.derivative_sd), prior.mean, prior.sd, steps, seed,
         list(model.effects), method, code_digest(),

@@ -93,7 +93,7 @@ def first_order(arguments, _) -> Answer:
         "residual_m_s2": table.residual_rms.to_numpy(), "offset_m_s2": offsets,
         "residual_ratio": found.triads.residual_ratio,
         "noise_over_declared": ratios.to_dict(), "gyroscopes": arguments.gyroscopes,
-        "gyroscope_matrix": found.gyroscope_matrix,
+        "gyroscope_matrix": found.maps["gyroscope"],
         "gyroscope_common_scale_sd": found.common_scale_sd,
     }, reasons_of_poses(of_first_order(found)))  # fmt: skip
 

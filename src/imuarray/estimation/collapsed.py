@@ -1,14 +1,13 @@
 """Data of a recording, arranged for the collapsed problem."""
 
-from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache
 from typing import NamedTuple, Self
 
 import numpy as np
 
 from imuarray.errors import IdentifiabilityError, InputError, require_shape
 from imuarray.estimation import kernels
-from imuarray.estimation.rates import angular_rates
+from imuarray.estimation.rates import most_likely, workspace
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel, structure_tensor
 from imuarray.motion.state import Motion, MotionEstimate
@@ -17,11 +16,15 @@ TOLERANCE = 1e-10  # relative, of a step of omega from which a sample's search e
 
 
 class Tables(NamedTuple):
-    """The structure tensor G as the kernels want it: its non-zero terms, and its columns."""
+    """The structure tensor G as the kernels want it: its non-zero terms, and its columns.
 
-    rows: np.ndarray  # (E, 3), unsigned: i, c, a of G[i, c, a]
+    Indices are unsigned: signed ones might count from the end, and would be looked up one by one.
+    """
+
+    tensor: np.ndarray  # (4, 3, 12)
+    rows: np.ndarray  # (E, 3): i, c, a of G[i, c, a]
     values: np.ndarray  # (E,)
-    pairs: np.ndarray  # (P, 4), unsigned: i, j, a, b of sum_c G[i, c, a] G[j, c, b]
+    pairs: np.ndarray  # (P, 4): i, j, a, b of sum_c G[i, c, a] G[j, c, b]
     products: np.ndarray  # (P,)
     square: np.ndarray  # (12, 6) by the arm and axis, of w
     linear: np.ndarray  # (12, 6), of phi
@@ -30,69 +33,46 @@ class Tables(NamedTuple):
 @cache
 def tables() -> Tables:
     """`Tables` of the structure tensor."""
-    tensor = structure_tensor()
+    tensor = np.array(structure_tensor())
     rows = np.argwhere(tensor != 0.0).astype(np.uint64, order="C")
     gram = np.einsum("ica,jcb->ijab", tensor, tensor)
     pairs = np.argwhere(gram != 0.0).astype(np.uint64, order="C")
     square, linear = (half.copy() for half in np.split(tensor.reshape(12, 12), 2, axis=1))
     return Tables(
-        rows, tensor[tuple(rows.T)].copy(), pairs, gram[tuple(pairs.T)].copy(), square, linear
-    )
+        tensor, rows, tensor[tuple(rows.T)].copy(), pairs, gram[tuple(pairs.T)].copy(), square,
+        linear,
+    )  # fmt: skip
 
 
-class Arrays(NamedTuple):
-    """A recording as the compiled searches for isotropic triads want it; see `Collapsed`."""
-
-    force: np.ndarray  # (A, 3, T) m/s^2
-    energy: np.ndarray  # (T,)
-    base: np.ndarray  # (3, T)
-    mean: np.ndarray  # (3, T) rad/s
-    rate_information: np.ndarray  # (3, 3, T)
-    weights: np.ndarray  # (A,)
-    tables: Tables
-
-
-def _weighted(precision, force) -> np.ndarray:
-    """Lambda y (A, 3, T) for any precision (3A, 3A)."""
-    return (precision @ force.reshape(len(precision), -1)).reshape(force.shape)
-
-
-@dataclass(frozen=True)
-class Collapsed:
-    """Data of every estimator of the papers' model, computed once.
+class Collapsed(NamedTuple):
+    """Data of every estimator of the papers' model, computed once; compiled code takes it as it is.
 
     Attributes (T samples, A accelerometer triads; time last)
     ----------
-    specific_force : (A, 3, T) m/s^2, each sample's mean over triads taken out (s_t
-        absorbs it exactly, and less is lost to rounding)
+    force : (A, 3, T) m/s^2, each sample's mean over triads taken out (s_t absorbs it exactly, and
+        less is lost to rounding); for a general covariance Lambda times that
     offset : (3, T) that mean
     energy : (T,) y' Lambda y
     base : (3, T) sum_k (Lambda y)_k
-    mean, gyroscope_information : (3, T), (3, 3, T), p(omega_t | y_g)
-    weights : (A,) 1 / sigma_k^2, or None for a general covariance
+    mean, rate_information : (3, T), (3, 3, T), p(omega_t | y_g)
+    weights : (A,) 1 / sigma_k^2, empty for a general covariance
+    precision : (3 A, 3 A) Lambda
     """
 
-    specific_force: np.ndarray
+    force: np.ndarray
     offset: np.ndarray
     energy: np.ndarray
     base: np.ndarray
     mean: np.ndarray
-    gyroscope_information: np.ndarray
-    weights: np.ndarray | None
+    rate_information: np.ndarray
+    weights: np.ndarray
     precision: np.ndarray
+    tables: Tables
 
     @property
     def samples(self) -> int:
         """Number T of samples."""
         return self.energy.size
-
-    @property
-    def arrays(self) -> Arrays:
-        """Arrays for compiled code; ``weights`` must not be None."""
-        return Arrays(
-            self.specific_force, self.energy, self.base, self.mean, self.gyroscope_information,
-            self.weights, tables(),
-        )  # fmt: skip
 
     @classmethod
     def of(cls, model: ArrayModel, specific_force, angular_rate, saturated=None) -> Self:
@@ -106,37 +86,35 @@ class Collapsed:
         require_shape("angular_rate", rate, (samples, model.array.gyroscopes, 3))
         if saturated is not None:
             require_shape("saturated", np.asarray(saturated), rate.shape)
-        precision = model.noise.accelerometer_precision
-        weights = model.noise.triad_weights
+        precision, weights = model.noise.accelerometer_precision, model.noise.triad_weights
         centred, offset = np.empty((accelerometers, 3, samples)), np.empty((3, samples))
         energy, base = np.empty(samples), np.empty((3, samples))
         plain = np.ones(accelerometers) if weights is None else weights
         kernels.arrange(force, plain, centred, offset, energy, base)
         if weights is None:
-            weighted = _weighted(precision, centred)
-            base = weighted.sum(axis=0)
-            energy = np.einsum("kct,kct->t", centred, weighted)
+            weighted = (precision @ centred.reshape(len(precision), -1)).reshape(centred.shape)
+            base, energy = weighted.sum(axis=0), np.einsum("kct,kct->t", centred, weighted)
+            centred, weights = weighted, np.empty(0)
         mean, information = model.noise.angular_rate_given_gyroscopes(rate, saturated)
         return cls(
             centred, offset, energy, base, np.ascontiguousarray(mean.T),
-            np.ascontiguousarray(information.transpose(1, 2, 0)), weights, precision,
+            np.ascontiguousarray(information.transpose(1, 2, 0)), weights,
+            np.ascontiguousarray(precision), tables(),
         )  # fmt: skip
 
-    @cached_property
+    @property
     def weighted(self) -> np.ndarray:
         """Lambda y, (A, 3, T)."""
-        if self.weights is None:
-            return _weighted(self.precision, self.specific_force)
-        return self.weights[:, None, None] * self.specific_force
+        return self.weights[:, None, None] * self.force if self.weights.size else self.force
 
     def with_rates(self, covariance, mean=None) -> Self:
         """The data with the covariance (T, 3, 3) (rad/s)^2, and mean (T, 3), of angular rates."""
         require_shape("rate_covariance", np.asarray(covariance), (self.samples, 3, 3))
         precision = np.linalg.inv(covariance).transpose(1, 2, 0)
-        return replace(
-            self, gyroscope_information=np.ascontiguousarray(precision),
+        return self._replace(
+            rate_information=np.ascontiguousarray(precision),
             mean=self.mean if mean is None else np.ascontiguousarray(mean.T),
-        )  # fmt: skip
+        )
 
     def rate_density(self, sd: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
         """Mean (T, 3) rad/s and covariance (T, 3, 3) of p(omega | y_g), (15) of paper 2021.
@@ -144,7 +122,7 @@ class Collapsed:
         ``sd`` (rad/s) of omega's prior, infinite as in the paper. InputError where an axis of some
         sample has no unsaturated gyroscope.
         """
-        information = self.gyroscope_information.transpose(2, 0, 1)
+        information = self.rate_information.transpose(2, 0, 1)
         bad = np.flatnonzero(np.linalg.matrix_rank(information) < 3)
         if bad.size:
             raise InputError(
@@ -158,17 +136,10 @@ class Collapsed:
 
     def reduce(self, positions) -> tuple[kernels.Reduced, float]:
         """(the recording with phi eliminated at ``positions`` (A, 3), log |H' Lambda H|)."""
-        known, out = tables(), kernels.reduced(self.samples)
         positions = np.ascontiguousarray(positions, float)
-        require_shape("positions", positions, (len(self.specific_force), 3))
-        if self.weights is None:
-            kernels.information_general(positions, self.precision, structure_tensor(), out.K)
-            arms, force = positions, self.weighted
-        else:
-            kernels.information(positions, self.weights, known.pairs, known.products, out.K)
-            arms, force = self.weights[:, None] * positions, self.specific_force
-        logdet = kernels.reduce(arms, force, self.base, self.energy, known.rows, known.values, out)
-        return out, logdet
+        require_shape("positions", positions, (len(self.force), 3))
+        out = kernels.reduced(self.samples)
+        return out, kernels.collapse(positions, self, out)
 
 
 def estimate_motion(
@@ -198,20 +169,14 @@ def estimate_motion(
 
 def motion_from(data: Collapsed, positions, limit: int = 50) -> MotionEstimate:
     """`estimate_motion` for data already arranged, at most ``limit`` steps a sample."""
-    found, logdet = data.reduce(positions)
-    if np.isnan(logdet):
+    positions = np.ascontiguousarray(positions, float)
+    require_shape("positions", positions, (len(data.force), 3))
+    rate, work = data.mean.copy(), workspace(data.samples)
+    if np.isnan(most_likely(data, positions, rate, TOLERANCE, limit, work)):
         raise IdentifiabilityError(
             "positions: expected triads from which omega_dot and s follow, found H'QH singular"
         )
-    rate = data.mean.copy()
-    cost, iterations = np.empty(data.samples), np.empty(data.samples, np.int64)
-    angular_rates(
-        rate, found.C, found.b, data.mean, data.gyroscope_information, TOLERANCE, limit, cost,
-        iterations,
-    )  # fmt: skip
-    state = np.empty((12, data.samples))
-    kernels.linear_motion(rate, found.X, found.phi, state)
-    return motion_estimate(data, rate, state, cost + found.const, iterations)
+    return motion_estimate(data, rate, work.state, work.cost + work.reduced.const, work.counts)
 
 
 def motion_estimate(data: Collapsed, rate, state, cost, iterations) -> MotionEstimate:

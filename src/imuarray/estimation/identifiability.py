@@ -1,6 +1,5 @@
 """Where a calibration under the papers' model begins, and whether the motion determines it."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,7 +48,7 @@ def arranged(model: ArrayModel, specific_force, angular_rate, start=None, satura
     positions = np.ascontiguousarray(positions - positions[0])
     require_planar_extent(positions, "positions")
     data = Collapsed.of(model, specific_force, angular_rate, saturated)
-    require_rotation([data], positions)
+    require_rotation(data, positions)
     return data, positions
 
 
@@ -65,27 +64,24 @@ def explain(status: int) -> None:
         raise IdentifiabilityError("positions: expected at least 3 triads that span a plane")
 
 
-def require_rotation(parts: Iterable[Collapsed], positions) -> None:
+def require_rotation(data: Collapsed, positions) -> None:
     """Raise IdentifiabilityError where omega and omega_dot stay on one axis throughout.
 
     Every A_n = Omega(omega)^2 + Omega(omega_dot) is then blind along that axis (Lemma 1).
     The same where there is no angular rate: omega_dot alone leaves the scale free. Noise
     and the start's wrong positions would hide this from a plain rank test, so the motion
     off the common axis is compared with what they can feign: 5 sigma of noise, and a tenth
-    of the centrifugal and Euler terms (positions wrong by a tenth of the array). ``parts``: the
-    samples, which are gone through twice.
+    of the centrifugal and Euler terms (positions wrong by a tenth of the array).
     """
-    sums = [(one.samples, one.mean @ one.mean.T, _informed(one)) for one in parts]
-    samples, gram = sum(one[0] for one in sums), sum(one[1] for one in sums)
-    values, axes = np.linalg.eigh(gram / samples)
+    values, axes = np.linalg.eigh(data.mean @ data.mean.T / data.samples)
     spread = np.sqrt(np.maximum(values[::-1], 0.0))
-    informed = np.array([one[2] for one in sums if one[2] > 0.0])
-    if not informed.size:
+    informed = data.rate_information[[0, 1, 2], [0, 1, 2]]
+    if not np.any(informed > 0.0):
         raise IdentifiabilityError(
             "gyroscopes: expected readings off their rails, found all of them at a rail throughout:"
             " the array's scale is then undetermined"
         )
-    noise = np.sqrt(1.0 / np.median(informed))
+    noise = np.sqrt(1.0 / np.median(informed[informed > 0.0]))
     if spread[0] <= 5 * noise:
         raise IdentifiabilityError(
             "motion: expected rotation, found no angular rate above the gyroscopes' noise: the"
@@ -93,20 +89,11 @@ def require_rotation(parts: Iterable[Collapsed], positions) -> None:
         )
     if spread[1] > max(1e-3 * spread[0], 5 * noise):
         return
-    whole = along = fast = 0.0
-    for one in parts:
-        turn = motion_from(one, positions).motion.angular_acceleration
-        whole, along = whole + np.sum(turn**2), along + np.sum((turn @ axes[:, 2]) ** 2)
-        fast += np.sum(one.mean**2)
-        inverse = one.reduce(positions)[0].inverse
-    across, along, fast = np.sqrt((whole - along) / samples), along / samples, fast / samples
-    if across <= max(
+    turn = motion_from(data, positions).motion.angular_acceleration
+    whole, along, fast = np.sum(turn**2), np.sum((turn @ axes[:, 2]) ** 2), np.sum(data.mean**2)
+    across, along, fast = np.array([whole - along, along, fast]) / data.samples
+    inverse = data.reduce(positions)[0].inverse
+    if np.sqrt(across) <= max(
         0.1 * np.hypot(np.sqrt(along), fast), 5 * np.sqrt(2 * np.max(np.diag(inverse)[:3]))
     ):
         explain(-1)
-
-
-def _informed(data: Collapsed) -> float:
-    """Median information of an axis' rate where there is any, 0 where there is none."""
-    informed = data.gyroscope_information[[0, 1, 2], [0, 1, 2]]
-    return float(np.median(informed[informed > 0.0])) if np.any(informed > 0.0) else 0.0

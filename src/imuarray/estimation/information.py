@@ -26,22 +26,22 @@ def arms(state) -> np.ndarray:
 
 
 @njit
-def slope(positions, force, weights, state, rows, values, made):
+def slope(positions, data, state, made):
     """Half the cost's fall per metre of each position, (A, 3), at the motion ``state`` (12, T).
 
     At the most likely motion this is the score of the profile likelihood. Fills ``made``
     (4, 3, T), the state's `arms`.
     """
-    kernels.arms(state, rows, values, made)
+    kernels.arms(state, data.tables.rows, data.tables.values, made)
     right, square = np.zeros(positions.shape), np.zeros((4, 3))
-    kernels.arm_products(made, force, right)
+    kernels.arm_products(made, data.force, right)
     kernels.arm_products(made, made, square)
     for k in range(len(positions)):
         for i in range(3):
             right[k, i] -= square[0, i]
             for j in range(3):
                 right[k, i] -= positions[k, j] * square[1 + j, i]
-            right[k, i] *= weights[k]
+            right[k, i] *= data.weights[k]
     return right
 
 
@@ -149,33 +149,25 @@ def _moments(entries, linear, inverse, square, absorbed):
 
 
 @njit
-def fisher(positions, weights, rate, entries, found, P, known):
-    """`information`, compiled; ``entries`` (3, 3, T) are Omega_t, P (3, 3, T) the gyroscopes'."""
-    square, absorbed = np.empty((3, 3)), np.empty((12, 12))
-    # what omega_dot and s take up, then what omega does
-    _moments(entries, known.linear, found.inverse, square, absorbed)
-    left = (known.square - known.linear @ found.X).reshape(4, 3, 6)
-    absorbed += _rate_gram(rate, found.C, P, entries, left)
-    size = 3 * len(positions) - 3
-    out = np.empty((size, size))
-    _assemble(positions, weights, square, absorbed, out)
-    return out
-
-
-def information(data: Collapsed, positions, rate, made, found) -> np.ndarray:
+def fisher(positions, data, rate, made, found):
     """Fisher information (3 (A - 1), 3 (A - 1)) of r_2 ... r_A, 1 / m^2, the motion unknown.
 
     ``rate`` (3, T) and ``made`` (4, 3, T), its `arms`, are the motion, ``found`` the data's
     `kernels.Reduced` at ``positions`` (A, 3). Its inverse is the Cramer-Rao bound of the positions.
     """
-    positions = np.ascontiguousarray(positions, float)
-    return fisher(
-        positions, data.weights, rate, made[1:], found, data.gyroscope_information, tables()
-    )
+    square, absorbed, known, entries = np.empty((3, 3)), np.empty((12, 12)), data.tables, made[1:]
+    # what omega_dot and s take up, then what omega does
+    _moments(entries, known.linear, found.inverse, square, absorbed)
+    left = (known.square - known.linear @ found.X).reshape(4, 3, 6)
+    absorbed += _rate_gram(rate, found.C, data.rate_information, entries, left)
+    size = 3 * len(positions) - 3
+    out = np.empty((size, size))
+    _assemble(positions, data.weights, square, absorbed, out)
+    return out
 
 
 def information_at(model: ArrayModel, motion, positions, saturated=None) -> np.ndarray:
-    """Fisher information (3 (A - 1),) squared, 1 / m^2, of r_2 ... r_A at a true motion (T, 3).
+    """`fisher` information (3 (A - 1),) squared, 1 / m^2, of r_2 ... r_A at a true motion (T, 3).
 
     The motion is unknown to who estimates; ``saturated`` (T, G, 3) axes say nothing.
     """
@@ -184,5 +176,5 @@ def information_at(model: ArrayModel, motion, positions, saturated=None) -> np.n
     turning = np.ascontiguousarray(np.asarray(motion.angular_rate).T)
     state = np.zeros((12, data.samples))
     state[:6], state[6:9] = products(turning.T).T, np.asarray(motion.angular_acceleration).T
-    found, _ = data.reduce(positions)
-    return information(data, positions, turning, arms(state), found)
+    positions = np.ascontiguousarray(positions, float)
+    return fisher(positions, data, turning, arms(state), data.reduce(positions)[0])

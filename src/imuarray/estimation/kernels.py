@@ -101,31 +101,26 @@ def _second_moments(positions, weights):
 
 
 @njit
-def information(positions, weights, pairs, values, out):
-    """K = sum_k lambda_k G_k' G_k (12, 12) for isotropic triads with weights (A,).
+def information(positions, data, out):
+    """K = sum_k lambda_k G_k' G_k (12, 12), for isotropic triads with ``data.weights`` (A,).
 
-    ``pairs`` (P, 4), unsigned, and ``values`` (P,) are the non-zero terms (i, j, a, b) of
-    G_i' G_j: a signed index might count from the end, and would be looked up number by number.
+    Where these are empty G' Lambda G for any ``data.precision`` (3A, 3A), cross-talk included.
     """
-    second = _second_moments(positions, weights)
-    out[:] = 0.0
-    for p in range(len(values)):
-        out[pairs[p, 2], pairs[p, 3]] += second[pairs[p, 0], pairs[p, 1]] * values[p]
-
-
-@njit
-def information_general(positions, precision, tensor, out):
-    """K = G' Lambda G for any precision (3A, 3A), cross-talk included."""
-    count = len(positions)
-    design = np.empty((3 * count, 12))
-    for k in range(count):
+    known, out[:] = data.tables, 0.0
+    if data.weights.size:
+        second, pairs = _second_moments(positions, data.weights), known.pairs
+        for p in range(len(pairs)):
+            out[pairs[p, 2], pairs[p, 3]] += second[pairs[p, 0], pairs[p, 1]] * known.products[p]
+        return
+    design = np.empty((3 * len(positions), 12))
+    for k in range(len(positions)):
         for c in range(3):
             for a in range(12):
-                value = tensor[0, c, a]
+                value = known.tensor[0, c, a]
                 for i in range(3):
-                    value += positions[k, i] * tensor[i + 1, c, a]
+                    value += positions[k, i] * known.tensor[i + 1, c, a]
                 design[3 * k + c, a] = value
-    out[:] = design.T @ (precision @ design)
+    out[:] = design.T @ (data.precision @ design)
 
 
 @njit
@@ -229,20 +224,32 @@ def reduced(samples):
 
 
 @njit
-def reduce(arms, force, base, energy, rows, values, out):
+def reduce(arms, force, data, out):
     """Fill ``out`` from its K on; returns log |H' Lambda H|, NaN (and stops) where singular.
 
     ``arms`` (A, 3) and ``force`` (A, 3, T) are the positions and Lambda y, or the positions times
-    the triads' weights and y; ``base`` (3, T) = sum_k (Lambda y)_k, ``energy`` (T,) = y' Lambda y.
+    the triads' weights and y; ``data.base`` (3, T) = sum_k (Lambda y)_k, ``data.energy`` (T,) =
+    y' Lambda y.
     """
-    logdet = eliminate(out.K, out.C, out.X, out.inverse)
+    known, logdet = data.tables, eliminate(out.K, out.C, out.X, out.inverse)
     if np.isnan(logdet):
         return logdet
-    out.moments[0] = base
+    out.moments[0] = data.base
     weighted_moments(arms, force, out.moments)
-    project(out.moments, rows, values, out.full)
-    reduce_linear(out.full, out.X, out.inverse, out.b, out.phi, out.const, energy)
+    project(out.moments, known.rows, known.values, out.full)
+    reduce_linear(out.full, out.X, out.inverse, out.b, out.phi, out.const, data.energy)
     return logdet
+
+
+@njit
+def collapse(positions, data, out):
+    """`reduce` of a `Collapsed` recording at ``positions`` (A, 3), K included."""
+    information(positions, data, out.K)
+    arms = positions.copy()
+    for k in range(data.weights.size):
+        for i in range(3):
+            arms[k, i] *= data.weights[k]
+    return reduce(arms, data.force, data, out)
 
 
 @njit(inline="always")

@@ -12,7 +12,7 @@ import scipy.linalg
 
 from imuarray.compiled import njit
 from imuarray.errors import IdentifiabilityError, require_shape
-from imuarray.estimation.collapsed import Arrays, Collapsed, motion_estimate
+from imuarray.estimation.collapsed import Collapsed, motion_estimate
 from imuarray.estimation.identifiability import Calibration, arranged, require_rotation
 from imuarray.estimation.information import fisher, information_at, slope
 from imuarray.estimation.rates import Work, most_likely, workspace
@@ -48,10 +48,10 @@ def fisher_scoring(
     is below ``tolerance``: no coordinate then moves by more of its own sd. IdentifiabilityError
     where the information is singular.
     """
-    given = Problem(data.arrays, *_prior(prior, data))
+    given = Problem(data, *_prior(prior, data))
     # one layout and one type each, or all would be compiled again
     start, tolerance, limit = np.array(start, float, order="C"), float(tolerance), max(limit, 0)
-    require_shape("start", start, (len(data.specific_force), 3))
+    require_shape("start", start, (len(data.force), 3))
     with one_thread():
         here, costs, steps, status = _search(given, start, tolerance, limit)
         width = _covariance(given, here) if covariance and status not in WHY else None
@@ -78,7 +78,7 @@ def _prior(prior, data: Collapsed):
     """(mean, precision), copied; empty for none."""
     if prior is None:
         return np.empty(0), np.empty((0, 0))
-    size = 3 * (len(data.specific_force) - 1)
+    size = 3 * (len(data.force) - 1)
     mean, precision = (np.array(part, float, order="C") for part in prior)
     require_shape("position prior's mean", mean, (size,))
     require_shape("position prior's precision", precision, (size, size))
@@ -88,7 +88,7 @@ def _prior(prior, data: Collapsed):
 class Problem(NamedTuple):
     """Data and prior of a search."""
 
-    data: Arrays
+    data: Collapsed
     prior_mean: np.ndarray  # (3 (A - 1),), or (0,) for none
     prior_precision: np.ndarray  # its square
 
@@ -149,7 +149,7 @@ def _evaluate(given, place):
 
     Fills the rest of it; the motion is searched from its rate.
     """
-    work, data, known = place.work, given.data, given.data.tables
+    work, data = place.work, given.data
     if np.isnan(most_likely(data, place.positions, place.rate, RATE, LIMIT, work)):
         return np.nan, False
     total = 0.0
@@ -159,9 +159,7 @@ def _evaluate(given, place):
             place.costs[t] = work.cost[t] + work.reduced.const[t]
             part += place.costs[t]
         total += part
-    by_triad = slope(
-        place.positions, data.force, data.weights, work.state, known.rows, known.values, work.arms
-    )
+    by_triad = slope(place.positions, data, work.state, work.arms)
     flat = place.positions.reshape(-1)[3:]
     place.slope[:] = by_triad.reshape(-1)[3:]
     for i in range(given.prior_mean.size):
@@ -194,26 +192,16 @@ def _shortened(given, here, there, step, enough):
 
 
 @njit
-def _information(given, place):
-    """The Fisher information of the positions, the prior's included."""
-    work = place.work
-    known = fisher(
-        place.positions, given.data.weights, place.rate, work.arms[1:], work.reduced,
-        given.data.rate_information, given.data.tables,
-    )  # fmt: skip
-    for i in range(given.prior_mean.size):
-        known[i] += given.prior_precision[i]
-    return known
-
-
-@njit
 def _curvature(given, place, factor):
-    """The information's Cholesky factor, above the diagonal; False where it is singular.
+    """Cholesky's factor of the information, the prior's included, above the diagonal.
 
+    Returns False where it is singular.
     By hand, for LAPACK's is not there in compiled code but as an exception: each row in turn is
     taken off those below, in vectors.
     """
-    factor[:] = _information(given, place)
+    factor[:] = fisher(place.positions, given.data, place.rate, place.work.arms, place.work.reduced)
+    for i in range(given.prior_mean.size):
+        factor[i] += given.prior_precision[i]
     size = len(factor)
     whole, row = np.diag(factor).copy(), np.empty(size)
     for k in range(size):
@@ -276,7 +264,7 @@ def calibrate_gauss_newton(
         data if rate_covariance is None else data.with_rates(rate_covariance), positions,
         position_prior, tolerance, limit,
     )  # fmt: skip
-    require_rotation([data], found.positions)
+    require_rotation(data, found.positions)
     return replace(found, cost=found.cost + apart(model, data, angular_rate, saturated))
 
 

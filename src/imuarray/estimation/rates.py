@@ -10,14 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.compiled import njit
-from imuarray.estimation.kernels import (
-    Reduced,
-    information,
-    linear_motion,
-    quadratic,
-    reduce,
-    reduced,
-)
+from imuarray.estimation.kernels import Reduced, collapse, linear_motion, quadratic, reduced
 
 TOGETHER = 4  # steps of all samples at once, before what is left goes one by one
 
@@ -227,18 +220,13 @@ def workspace(samples):
 
 @njit
 def most_likely(data, positions, rate, tolerance, limit, work):
-    """The most likely motion at ``positions`` (A, 3) of a recording's `Arrays`.
+    """The most likely motion at ``positions`` (A, 3) of a `Collapsed` recording.
 
     The search for omega starts at ``rate`` (3, T). Fills ``rate`` and ``work``; returns
     log |H' Lambda H|, NaN where that is singular.
     """
-    found, known = work.reduced, data.tables
-    information(positions, data.weights, known.pairs, known.products, found.K)
-    scaled = np.empty_like(positions)
-    for k in range(len(positions)):
-        for i in range(3):
-            scaled[k, i] = data.weights[k] * positions[k, i]
-    logdet = reduce(scaled, data.force, data.base, data.energy, known.rows, known.values, found)
+    found = work.reduced
+    logdet = collapse(positions, data, found)
     if np.isnan(logdet):
         return logdet
     angular_rates(

@@ -11,9 +11,10 @@ from scipy.special import gammaln, stdtr
 from imuarray.errors import InputError
 from imuarray.firstorder.moves import CommonMap, Move, common_map, gather, prior_precision
 from imuarray.firstorder.settings import SETTINGS
+from imuarray.firstorder.still import Still, averaged_sd
 from imuarray.firstorder.triads import TriadFit
 from imuarray.firstorder.turns import nearest_orthogonal, require_rotations
-from imuarray.recording import Recording
+from imuarray.linear import diagonal_blocks
 from imuarray.tails import MEDIAN, t4
 
 SLOWEST = np.radians(20.0)  # rad/s; slower samples say little of scales
@@ -145,9 +146,7 @@ class Gyroscopes:
     @property
     def blocks(self) -> np.ndarray:
         """(G, 9, 9) covariance of each matrix, row by row."""
-        count = len(self.matrix)
-        split = self.covariance.reshape(count, 9, count, 9)
-        return split[range(count), :, range(count)]
+        return diagonal_blocks(self.covariance, 9)
 
     @property
     def common_scale_sd(self) -> float:
@@ -202,36 +201,6 @@ def shift_odds(mean: float, sd: float, freedom: int, shift: float) -> float:
     return float(np.exp(np.log(sd / wide) - (mean / wide) ** 2 / 2 - t))
 
 
-class Still(NamedTuple):
-    """A recording's P still poses, and what the gyroscopes read in them.
-
-    ``offsets`` (P, G, 3) rad/s the mean readings, ``noise`` (G, 3) rad/s.
-    """
-
-    recording: Recording
-    poses: list[slice]
-    offsets: np.ndarray
-    noise: np.ndarray
-
-    @property
-    def force(self) -> list[np.ndarray]:
-        """Specific forces (n, A, 3) m/s^2 of each pose."""
-        return [self.recording.specific_force[pose] for pose in self.poses]
-
-    @property
-    def moving(self) -> np.ndarray:
-        """(T,) bool: in no pose."""
-        found = np.ones(len(self.recording.time), bool)
-        for pose in self.poses:
-            found[pose] = False
-        return found
-
-    def rate(self) -> np.ndarray:
-        """Angular rates (T, G, 3) rad/s without their offsets."""
-        counts = [pose.stop - pose.start for pose in self.poses]
-        return self.recording.angular_rate - np.average(self.offsets, axis=0, weights=counts)
-
-
 def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> tuple[Gyroscopes, TriadFit]:
     """Maps of all gyroscopes: relative to their mean, and one common map from the moves.
 
@@ -243,23 +212,24 @@ def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> tuple[Gyro
     InputError for a gyroscope that is mirrored or dead, for wrong units and for left-handed axes.
     """
     first, begun = every[0].recording, 0.0
-    times = []
+    times, rates = [], []
     for one in every:  # one after the other, far apart
         times.append(one.recording.time - one.recording.time[0] + begun)
         begun = times[-1][-1] + SETTINGS.recordings_apart
-    rate = np.concatenate([one.rate() for one in every])
+        offset = np.average(one.means("gyroscope"), axis=0, weights=one.counts)
+        rates.append(one.recording.angular_rate - offset)
     free = np.concatenate([one.moving & ~one.recording.at_rail("gyroscope") for one in every])
     labels, turns = first.gyroscope_labels, nearest_orthogonal(triads.matrix)
     turned = dict(zip(first.accelerometer_labels, turns, strict=True))
     start = np.array([turned.get(label, np.eye(3)) for label in labels])
-    relative = compare(rate, np.concatenate(times), free, start, labels)
+    relative = compare(np.concatenate(rates), np.concatenate(times), free, start, labels)
     if isinstance(relative, str):
         turn, maps = start, np.broadcast_to(np.eye(3), start.shape)
     else:
         turn, maps = relative.turn, relative.map
     moves = _moves(every, turn @ maps)
-    count = triads.direction.size
-    common = common_map(moves, triads.direction, triads.fitted.covariance[-count:, -count:])
+    own = slice(-triads.direction.size, None)
+    common = common_map(moves, triads.direction, triads.fitted.covariance[own, own])
     matrix, covariance, by_common = _together(turn, maps, relative, common)
     beside = np.zeros((len(covariance), 9 * len(triads.matrix)))
     if not isinstance(common, str):
@@ -274,8 +244,8 @@ def _moves(every: Sequence[Still], matrix) -> list[Move]:
     count = len(back)
     for one in every:
         mean = np.einsum("kij,tkj->ti", back, one.recording.angular_rate) / count
-        still = np.einsum("kij,pkj->pi", back, one.offsets) / count
-        sd = float(np.sqrt(np.mean(one.noise**2) / count))
+        still = np.einsum("kij,pkj->pi", back, one.means("gyroscope")) / count
+        sd = float(np.sqrt(np.mean(one.noise("gyroscope", averaged_sd) ** 2) / count))
         good = ~one.recording.at_rail("gyroscope")
         own = gather(mean, one.recording.time, one.poses, still, good, sd)
         moves += [move._replace(first=move.first + poses) for move in own]

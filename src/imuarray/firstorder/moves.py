@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from imuarray.errors import InputError
 from imuarray.firstorder.settings import SETTINGS
+from imuarray.linear import diagonal_blocks
 
 LOST = np.radians(10.0)  # median error of a move from which the rates are not what they say
 NODE = np.sqrt(3) / 6
@@ -258,7 +259,12 @@ def _fit(moves, direction, covariance, turn, before) -> CommonMap:
         change = change + delta.reshape(3, 3)
         # share of each move's variance that the map has left in its error
         rest = total - slopes @ np.linalg.solve(normal, slopes.T)
-        shares = np.einsum("nii->n", np.linalg.solve(_each(total), _each(rest))) / 2
+        shares = (
+            np.einsum(
+                "nii->n", np.linalg.solve(diagonal_blocks(total, 2), diagonal_blocks(rest, 2))
+            )
+            / 2
+        )
         free = np.clip(shares, 0.05, 1.0)
         inflation, size = _weights(errors - slopes @ delta, given, own, size, free)
         if np.abs(delta).max() < SETTINGS.move_close:
@@ -274,15 +280,9 @@ def _fit(moves, direction, covariance, turn, before) -> CommonMap:
     )  # fmt: skip
 
 
-def _each(covariance) -> np.ndarray:
-    """(n, 2, 2) of each move, of all (2 n, 2 n)."""
-    count = len(covariance) // 2
-    return covariance.reshape(count, 2, count, 2)[range(count), :, range(count)]
-
-
 def _weights(left, given, own, size, free):
     """Inflation of each move's variance by its own error, and of all by the typical one."""
-    left, blocks = left.reshape(-1, 2), _each(given)
+    left, blocks = left.reshape(-1, 2), diagonal_blocks(given, 2)
 
     def squares(size):
         solved = np.linalg.solve(blocks + size * own, left[..., None])[..., 0]

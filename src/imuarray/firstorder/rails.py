@@ -15,11 +15,6 @@ def rails_shown(inverse, rails) -> np.ndarray:
     return np.einsum("kij,tkj->tki", near.astype(np.int8), rails.astype(np.int8)) > 0
 
 
-def nearest_rail(limit: float, matrix, offset) -> float:
-    """The rail after correction, at its nearest."""
-    return float((limit - np.abs(offset).max()) / np.abs(matrix).max())
-
-
 def less_leak(
     recording: Recording, correction: xr.Dataset, rate, saturated
 ) -> tuple[Recording, np.ndarray]:

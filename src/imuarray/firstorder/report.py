@@ -1,5 +1,7 @@
 """A first-order calibration in tables and in a file: parameters with sds, residuals, noise."""
 
+from itertools import product
+
 import numpy as np
 import pandas as pd
 import xarray as xr
@@ -12,7 +14,7 @@ from imuarray.firstorder.still import allan_deviation
 from imuarray.firstorder.turns import TURNED, angle_of, nearest_orthogonal, parts_of, parts_sd_of
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording, write_recording
-from imuarray.recording.record import FIRST_ORDER, KINDS
+from imuarray.recording.record import FIRST_ORDER, KINDS, NUMBERS
 
 MISALIGNMENT = ("xy", "xz", "yz")
 UNITS = {"scale": "1", "misalignment": "1", "orientation": "rad"}
@@ -20,28 +22,20 @@ UNITS = {"scale": "1", "misalignment": "1", "orientation": "rad"}
 
 def parameter_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     """One row a parameter: sensor, triad, parameter, component, value, sd, unit."""
-    parts, sds = parts_of(found.triads.matrix), found.triads.parts_sd()
-    parts["offset"] = found.triads.offset
-    rows = _rows("accelerometer", recording.accelerometer_labels, parts, sds, "m s-2")
-    parts, sds = {}, {}
-    if found.gyroscopes is not None:
-        maps = found.gyroscopes
-        parts, sds = parts_of(maps.matrix), parts_sd_of(maps.matrix, maps.blocks)
-    parts["offset"], sds["offset"] = found.gyroscope_offset, found.gyroscope_offset_sd
-    rows += _rows("gyroscope", recording.gyroscope_labels, parts, sds, "rad s-1")
+    maps, rows = found.gyroscopes, []
+    known = {"accelerometer": (parts_of(found.triads.matrix), found.triads.parts_sd())}
+    known["gyroscope"] = {}, {}
+    if maps is not None:
+        known["gyroscope"] = parts_of(maps.matrix), parts_sd_of(maps.matrix, maps.blocks)
+    for kind, (parts, sds) in known.items():
+        own, units = found.at_rest[kind], UNITS | {"offset": NUMBERS[f"{kind}_noise_sd"]}
+        parts, sds = parts | {"offset": own.offset}, sds | {"offset": own.offset_sd}
+        for (k, label), name in product(enumerate(getattr(recording, f"{kind}_labels")), parts):
+            for i, component in enumerate(MISALIGNMENT if name == "misalignment" else "xyz"):
+                value, sd = parts[name][k, i], sds[name][k, i]
+                rows.append((kind, label, name, component, value, sd, units[name]))
     names = ["sensor", "triad", "parameter", "component", "value", "sd", "unit"]
     return pd.DataFrame(rows, columns=names)
-
-
-def _rows(sensor: str, labels, parts, sds, offset_unit: str) -> list[tuple]:
-    rows = []
-    for k, label in enumerate(labels):
-        for name, values in parts.items():
-            unit = UNITS.get(name, offset_unit)
-            for i, component in enumerate(MISALIGNMENT if name == "misalignment" else "xyz"):
-                value, sd = values[k, i], sds[name][k, i]
-                rows.append((sensor, label, name, component, value, sd, unit))
-    return rows
 
 
 def summary_lines(found: FirstOrder, recording: Recording) -> list[str]:
@@ -71,10 +65,11 @@ def summary_lines(found: FirstOrder, recording: Recording) -> list[str]:
 def walk_lines(found: FirstOrder, recording: Recording) -> list[str]:
     """For a person: how far offsets walk in a minute, where they do, and whose most."""
     root, shown = np.sqrt(60.0), []
-    for kind, walks, unit in (
-        ("accelerometer", 1e3 * found.triads.walk, "mm/s^2"),
-        ("gyroscope", np.degrees(found.gyroscope_walk), "deg/s"),
+    for kind, scale, unit in (
+        ("accelerometer", 1e3, "mm/s^2"),
+        ("gyroscope", np.degrees(1), "deg/s"),
     ):
+        walks = scale * found.at_rest[kind].walk
         most, usual = int(np.argmax(walks)), root * np.median(walks)
         if root * walks[most] > SETTINGS.walk_apart * usual:
             label = getattr(recording, f"{kind}_labels")[most]
@@ -128,9 +123,7 @@ def gyroscope_lines(maps: Gyroscopes | None, recording: Recording) -> list[str]:
 def turned_lines(found: FirstOrder, recording: Recording) -> list[str]:
     """One line for each IMU or sensor whose axes are off those declared by more than a mount is."""
     against, labels = found.drawing_turn, recording.accelerometer_labels
-    maps = {"accelerometer": found.triads.matrix}
-    if found.gyroscopes is not None:
-        maps["gyroscope"] = found.gyroscopes.matrix
+    maps = found.maps if found.gyroscopes is not None else {"accelerometer": found.triads.matrix}
     angles = {
         (kind, label): float(angle)
         for kind, matrices in maps.items()
@@ -168,7 +161,7 @@ def residual_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     return pd.DataFrame({
         "triad": recording.accelerometer_labels, "poses": len(fit.used),
         "left_out": (~fit.relied).sum(axis=0), "residual_rms": fit.residual_rms,
-        "residual_rms_all_poses": fit.residual_rms_all,
+        "residual_rms_all_poses": np.sqrt(np.mean(fit.residual**2, axis=(0, 2))),
     })  # fmt: skip
 
 
@@ -200,10 +193,10 @@ def noise_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     for kind in KINDS:
         taus, deviation, _ = _allan(found.poses, recording, kind)
         declared = getattr(recording, f"{kind}_noise_sd")
-        sd = getattr(found, f"{kind}_noise")
+        own = found.at_rest[kind]
         columns = {
-            "declared": np.full_like(sd, declared), "sd": sd, "ratio": sd / declared,
-            "correlation": getattr(found, f"{kind}_correlation"),
+            "declared": np.full_like(own.noise, declared), "sd": own.noise,
+            "ratio": own.noise / declared, "correlation": own.correlation,
             "allan_1s": deviation[np.argmin(np.abs(taus - 1.0))],
             "floor": deviation.min(axis=0), "floor_tau": taus[deviation.argmin(axis=0)],
         }  # fmt: skip
@@ -231,7 +224,7 @@ def write_corrected(recording: Recording, found: FirstOrder, path) -> None:
 
 def _first_order_dataset(recording: Recording, found) -> xr.Dataset:
     """Matrix, offset and their covariance, poses, residuals, noise."""
-    fit = found.triads
+    fit, (forces, rates) = found.triads, found.at_rest.values()
     accelerometer, gyroscope = ("accelerometer", "axis"), ("gyroscope", "axis")
     times = recording.time
     limits = [(times[pose.start], times[pose.stop - 1]) for pose in found.poses]
@@ -245,14 +238,14 @@ def _first_order_dataset(recording: Recording, found) -> xr.Dataset:
         "residual": (("pose", "accelerometer", "axis"), fit.residual, {"units": "m s-2"}),
         "used": (("pose", "accelerometer"), fit.relied),
         "pose_time": (("pose", "edge"), np.array(limits), {"units": "s"}),
-        "accelerometer_noise": (accelerometer, found.accelerometer_noise, {"units": "m s-2"}),
-        "gyroscope_offset": (gyroscope, found.gyroscope_offset, {"units": "rad s-1"}),
-        "gyroscope_offset_sd": (gyroscope, found.gyroscope_offset_sd, {"units": "rad s-1"}),
+        "accelerometer_noise": (accelerometer, forces.noise, {"units": "m s-2"}),
+        "gyroscope_offset": (gyroscope, rates.offset, {"units": "rad s-1"}),
+        "gyroscope_offset_sd": (gyroscope, rates.offset_sd, {"units": "rad s-1"}),
         "accelerometer_walk": (("accelerometer",), fit.walk, {"units": "m s-2 s-0.5"}),
-        "gyroscope_walk": (("gyroscope",), found.gyroscope_walk, {"units": "rad s-1 s-0.5"}),
-        "gyroscope_noise": (gyroscope, found.gyroscope_noise, {"units": "rad s-1"}),
-        "accelerometer_smoothing": (accelerometer, found.accelerometer_smoothing, {"units": "1"}),
-        "gyroscope_smoothing": (gyroscope, found.gyroscope_smoothing, {"units": "1"}),
+        "gyroscope_walk": (("gyroscope",), rates.walk, {"units": "rad s-1 s-0.5"}),
+        "gyroscope_noise": (gyroscope, rates.noise, {"units": "rad s-1"}),
+        "accelerometer_smoothing": (accelerometer, forces.smoothing, {"units": "1"}),
+        "gyroscope_smoothing": (gyroscope, rates.smoothing, {"units": "1"}),
     }  # fmt: skip
     coords = {
         "accelerometer": list(recording.accelerometer_labels),

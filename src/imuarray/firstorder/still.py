@@ -4,17 +4,84 @@ Still is where array-averaged readings only show noise; the deviation tells whic
 averaging can remove.
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Self
+
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from imuarray.errors import InputError
 from imuarray.firstorder.settings import SETTINGS
 from imuarray.firstorder.turns import nearest_orthogonal
 from imuarray.recording import Recording
-from imuarray.recording.channels import runs
+from imuarray.recording.channels import require_live, require_once, runs
 from imuarray.recording.record import KINDS
-from imuarray.recording.units import require_plausible_rate
+from imuarray.recording.units import GRAVITY, require_plausible_rate
 
 TURNING = np.radians(2.0)  # rad/s of all gyroscopes: a steady turn, as offsets do not go together
+
+
+@dataclass(frozen=True)
+class Still:
+    """A recording's P still poses, and what its sensors read in them."""
+
+    recording: Recording
+    poses: list[slice]
+
+    @classmethod
+    def of(cls, recording: Recording, shortest: float) -> Self:
+        """With poses of ``shortest`` s at least; InputError also for dead or doubled channels."""
+        require_live(recording)
+        require_once(recording)
+        return cls(recording, still_poses(recording, shortest))
+
+    def pieces(self, kind: str) -> list[np.ndarray]:
+        """Readings (n, K, 3) of a kind of sensor in each pose."""
+        readings = getattr(self.recording, KINDS[kind])
+        return [readings[pose] for pose in self.poses]
+
+    @property
+    def counts(self) -> np.ndarray:
+        """(P,) of samples."""
+        return np.array([pose.stop - pose.start for pose in self.poses])
+
+    def means(self, kind: str) -> np.ndarray:
+        """(P, K, 3) mean readings of a kind in each pose."""
+        return np.array([piece.mean(axis=0) for piece in self.pieces(kind)])
+
+    def noise(self, kind: str, of: Callable) -> np.ndarray:
+        """(K, 3) noise of a kind, ``of`` pieces (n, K, 3) and a step (`reading_sd`, `averaged_sd`).
+
+        The declared one of gyroscopes where most of their readings are exactly 0.
+        """
+        pieces = self.pieces(kind)
+        sd = of(pieces, usual_step(self.recording.time))
+        if kind == "accelerometer":  # one that is quantised and never changes has no spread
+            return np.maximum(sd, 1e-6 * GRAVITY)
+        dead = np.mean(np.concatenate(pieces) == 0.0, axis=0) > SETTINGS.dead_band
+        return np.where(dead, self.recording.gyroscope_noise_sd, sd)
+
+    @property
+    def moving(self) -> np.ndarray:
+        """(T,) bool: in no pose."""
+        found = np.ones(len(self.recording.time), bool)
+        found[np.r_[tuple(self.poses)]] = False
+        return found
+
+    @property
+    def after_moving(self) -> np.ndarray:
+        """(P,) s of the poses' middles after the moving samples', where offsets are wanted."""
+        time, moving = self.recording.time, self.moving
+        middle = np.median(time[moving]) if moving.any() else time[-1]
+        return np.array([time[pose].mean() for pose in self.poses]) - middle
+
+    @property
+    def tells(self) -> bool:
+        """True where poses say more than offsets of their own: in two orientations they do not."""
+        means = self.means("accelerometer")[:, 0]
+        sizes = np.linalg.svd(means - means.mean(axis=0), compute_uv=False)
+        return len(means) > 2 and sizes[1] > SETTINGS.orientations * GRAVITY
 
 
 def allan_deviation(pieces, step: float) -> tuple[np.ndarray, np.ndarray]:
@@ -95,24 +162,14 @@ def _neighbours(pieces, constant: float) -> np.ndarray:
     return np.where(squares > 0, products / np.where(squares > 0, squares, 1.0), constant)
 
 
-def outside_dead_band(sd, pieces, declared: float) -> np.ndarray:
-    """Noise ``sd`` (...), the ``declared`` one where most still readings are exactly 0."""
-    return np.where(
-        np.mean(np.concatenate(pieces) == 0.0, axis=0) > SETTINGS.dead_band, declared, sd
-    )
-
-
 def window_spread(readings: np.ndarray, window: int) -> np.ndarray:
     """Root mean variance over axes of readings (T, 3) in a centred window of samples, (T,)."""
-    # cumulative sums of centred values keep the rounding far below the noise
+    # sums of centred values keep the rounding far below the noise
     centred = readings - readings.mean(axis=0)
-    sums = [np.vstack([np.zeros(3), np.cumsum(x, axis=0)]) for x in (centred, centred**2)]
-    index = np.arange(len(readings))
-    first = np.clip(index - window // 2, 0, max(len(readings) - window, 0))
-    last = np.minimum(first + window, len(readings))
-    count = (last - first)[:, None]
-    mean, square = ((total[last] - total[first]) / count for total in sums)
-    return np.sqrt(np.maximum(square - mean**2, 0.0).mean(axis=1))
+    mean, square = (uniform_filter1d(x, window, axis=0) for x in (centred, centred**2))
+    spread = np.sqrt(np.maximum(square - mean**2, 0.0).mean(axis=1))
+    inside = window // 2, len(readings) - window + window // 2
+    return spread[np.clip(np.arange(len(readings)), *inside)]
 
 
 def still_poses(recording: Recording, shortest=SETTINGS.shortest) -> list[slice]:

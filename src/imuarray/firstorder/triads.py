@@ -15,9 +15,11 @@ from imuarray.errors import IdentifiabilityError
 from imuarray.firstorder.pose_noise import PoseNoise
 from imuarray.firstorder.settings import SETTINGS
 from imuarray.firstorder.turns import parts_sd_of, procrustes, require_rotations
+from imuarray.linear import diagonal_blocks
 from imuarray.model.jax64 import jax, jnp
 
 UPPER = np.triu_indices(3)
+GONE = 3, 5, 5  # where the first matrix's zeros are missing among the others of its entries
 SMALL = np.radians(20.0)  # a triad turned by less starts from the drawing
 
 
@@ -27,6 +29,10 @@ class Fitted(NamedTuple):
     values: np.ndarray
     covariance: np.ndarray
     given: "Poses"
+
+    def spread(self, place) -> np.ndarray:
+        """Covariance (n + 3, ...) of all, the first matrix's zeros too, with those at ``place``."""
+        return np.insert(np.insert(self.covariance, GONE, 0.0, 0), GONE, 0.0, 1)[:, place]
 
 
 @dataclass(frozen=True)
@@ -64,10 +70,7 @@ class TriadFit:
 
     def beside_directions(self) -> np.ndarray:
         """Covariance (9 A, 3 P) of the matrices with all poses' directions."""
-        out = np.zeros((len(self.covariance), 3 * len(self.fitted.given.mean)))
-        place = _places(len(self.matrix))
-        out[place] = self.fitted.covariance[: len(place), -out.shape[1] :]
-        return out.reshape(-1, 12, out.shape[1])[:, :9].reshape(-1, out.shape[1])
+        return self.fitted.spread(slice(-self.fitted.given.unit.size, None))[: self.matrix.size]
 
     def carried(self, score, information) -> Self:
         """The fit once rates have carried gravity from pose to pose.
@@ -100,26 +103,19 @@ class TriadFit:
         squares = np.mean(self.residual**2, axis=2)
         return np.sqrt(np.sum(squares * self.relied, axis=0) / self.relied.sum(axis=0))
 
-    @property
-    def residual_rms_all(self) -> np.ndarray:
-        """Residual rms over all poses, those left out included."""
-        return np.sqrt(np.mean(self.residual**2, axis=(0, 2)))
-
     def parts_sd(self) -> dict[str, np.ndarray]:
         """Standard deviations of `parts_of` the matrices, and of the offset."""
-        count = len(self.matrix)
-        blocks = self.covariance.reshape(count, 12, count, 12)[range(count), :, range(count)]
+        blocks = diagonal_blocks(self.covariance, 12)
         offset = np.sqrt(np.einsum("kii->ki", blocks[:, 9:, 9:]))
         return parts_sd_of(self.matrix, blocks[:, :9, :9]) | {"offset": offset}
 
 
 def _unpack(p, triads, poses):
     """(matrices (A, 3, 3), offsets (R, A, 3), directions (P, 3) not normalised) from the flat p."""
-    first = jnp.zeros((3, 3)).at[UPPER].set(p[:6])
-    split, end = 6 + 9 * (triads - 1), len(p) - 3 * poses
-    others = p[6:split].reshape(triads - 1, 3, 3)
-    offsets = p[split:end].reshape(-1, triads, 3)
-    return jnp.concatenate([first[None], others]), offsets, p[end:].reshape(-1, 3)
+    whole = jnp.insert(p, np.array(GONE), 0.0)
+    parts = jnp.split(whole, [9 * triads, len(whole) - 3 * poses])
+    shapes = (triads, 3, 3), (-1, triads, 3), (poses, 3)
+    return [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]
 
 
 def _predicted(p, triads, magnitude, recording):
@@ -249,23 +245,12 @@ def _by_reading(white, values) -> np.ndarray:
     return np.moveaxis(back / np.sqrt(np.where(weight > 0, weight, 1.0)), 2, 0)
 
 
-def _places(triads: int) -> np.ndarray:
-    """Where the matrices' and the first recording's offsets' parameters are among (12 A,)."""
-    return np.concatenate(
-        [3 * UPPER[0] + UPPER[1]]
-        + [12 * k + np.arange(9) for k in range(1, triads)]
-        + [12 * k + 9 + np.arange(3) for k in range(triads)]
-    )
-
-
 def _offset_of(own: Fitted, triads: int, number: int) -> tuple[np.ndarray, np.ndarray]:
     """A recording's offsets (A, 3), and the covariance (12 A, 12 A) of matrices and these."""
-    place, split = _places(triads), 6 + 9 * (triads - 1)
-    mine = split + 3 * triads * number + np.arange(3 * triads)
-    index = np.ix_(*2 * [np.concatenate([np.arange(split), mine])])
-    covariance = np.zeros((12 * triads, 12 * triads))
-    covariance[np.ix_(place, place)] = own.covariance[index]
-    return own.values[mine].reshape(triads, 3), covariance
+    first = 9 * triads + 3 * triads * number
+    mine = np.arange(first, first + 3 * triads).reshape(-1, 3)
+    place = np.hstack([np.arange(9 * triads).reshape(-1, 9), mine]).ravel()
+    return own.values[mine - len(GONE)], own.spread(place)[place]
 
 
 def _result(own: Fitted, used, ratio: float, walk, doubtful) -> TriadFit:

@@ -195,9 +195,7 @@ def _laplace(rate, C, b, constant, data):
     return jnp.sum(_exponent(rate[:, None], C, b, constant, data)), jnp.sum(volumes)
 
 
-@jax.jit
-def _value(positions, data, nodes, log_weights):
-    return log_marginal(positions, data, nodes, log_weights)
+_value = jax.jit(log_marginal)
 
 
 @dataclass(frozen=True)

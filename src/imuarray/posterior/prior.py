@@ -8,10 +8,14 @@ import numpy as np
 
 @dataclass(frozen=True)
 class GaussianPrior:
-    """Independent normal prior of theta: ``mean`` and ``sd`` (size,), metres for positions."""
+    """Normal prior of theta: ``mean`` and ``sd`` (size,), metres for positions.
+
+    Independent, but where there is a ``root`` (size, size): the precision is then root' root.
+    """
 
     mean: np.ndarray
     sd: np.ndarray
+    root: np.ndarray | None = None
 
     @classmethod
     def of(cls, mean, sd) -> Self:
@@ -19,14 +23,7 @@ class GaussianPrior:
         mean = np.asarray(mean, float)
         return cls(mean, np.broadcast_to(np.asarray(sd, float), mean.shape).copy())
 
-
-@dataclass(frozen=True)
-class TiedPrior(GaussianPrior):
-    """A Gaussian prior with precision ``root``' ``root`` (size, size)."""
-
-    root: np.ndarray
-
     @classmethod
-    def of(cls, mean, root) -> Self:
+    def tied(cls, mean, root) -> Self:
         """With the sds that follow."""
         return cls(mean, np.sqrt(np.sum(np.linalg.inv(root) ** 2, axis=1)), root)

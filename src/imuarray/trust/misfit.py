@@ -166,10 +166,10 @@ class Poses(NamedTuple):
 def of_first_order(found: FirstOrder) -> Poses:
     """From the answer."""
     common = None if found.gyroscopes is None else found.gyroscopes.common
-    own = {f"{kind}_smoothing": getattr(found, f"{kind}_smoothing") for kind in KINDS}
+    own = {f"{kind}_smoothing": rest.smoothing for kind, rest in found.at_rest.items()}
     own |= {"residual": found.triads.residual, "used": found.triads.relied}
     if not (common is None or isinstance(common, str)):
-        own |= {"gyroscope_common": common.map, "gyroscope_matrix": found.gyroscope_matrix}
+        own |= {"gyroscope_common": common.map, "gyroscope_matrix": found.maps["gyroscope"]}
     return _poses(own, found.triads.residual_ratio)
 
 

@@ -46,7 +46,7 @@ def _position_block(force, state, rows, values, A, positions):
 
 @njit
 def block_descent(data, positions, tolerance, limit, marks):
-    """Algorithm 1 on a recording's `Arrays`; ``positions`` (A, 3) is start and result.
+    """Algorithm 1 on a `Collapsed` recording; ``positions`` (A, 3) is start and result.
 
     Returns (status, cost (n,), step (n,), snapshots (S, A, 3)) as `Calibration` has them after n
     iterations: status 1 converged, 0 stopped at the limit, -1 sum A'A singular, -2 H' Lambda H
@@ -107,9 +107,9 @@ def calibrate_bcd(
     """
     data, positions = arranged(model, specific_force, angular_rate, start, saturated)
     marks = np.asarray(sorted(marks), np.int64)
-    status, *path = block_descent(data.arrays, positions, float(tolerance), limit, marks)
+    status, *path = block_descent(data, positions, float(tolerance), limit, marks)
     explain(status)
-    require_rotation([data], positions)  # again: the start's errors no longer blur the motion
+    require_rotation(data, positions)  # again: the start's errors no longer blur the motion
     motion = motion_from(data, positions)
     cost, step, snapshots = path
     return Calibration(positions, motion, cost, step, status == 1, snapshots)

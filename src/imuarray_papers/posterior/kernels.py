@@ -7,39 +7,28 @@ import numpy as np
 
 from imuarray.compiled import njit
 from imuarray.estimation import kernels
-from imuarray.estimation.collapsed import Tables
+from imuarray.estimation.collapsed import Collapsed
 from imuarray_papers.posterior import draws
 
 
 class LikelihoodData(NamedTuple):
     """A recording as the compiled likelihood wants it; time is the last axis."""
 
+    collapsed: Collapsed
     weighted: np.ndarray  # (A, 3, T) Lambda y
-    energy: np.ndarray  # (T,) y' Lambda y
-    base: np.ndarray  # (3, T) sum_k (Lambda y)_k
     mean: np.ndarray  # (3, T) mean of the density omega_t is drawn from, p(omega_t | y_g)
     factor: np.ndarray  # (6, T) its covariance's Cholesky factor: xx, yx, yy, zx, zy, zz
     log_weight: np.ndarray  # (10, T) log p - log of that density: 1, x, y, z, the six products
-    weights: np.ndarray  # (A,) 1 / sigma_k^2, empty for a general covariance
-    precision: np.ndarray  # (3A, 3A) Lambda, empty for isotropic triads
-    tensor: np.ndarray  # (4, 3, 12)
-    tables: Tables
     ridge: np.ndarray  # (3,) prior precision of omega_dot (s^4/rad^2), zero where flat
 
 
 @njit
 def collapse(positions, data, out):
     """Everything that depends on theta but not on omega; returns log |H' Lambda H|."""
-    if data.weights.size:
-        kernels.information(positions, data.weights, data.tables.pairs, data.tables.products, out.K)
-    else:
-        kernels.information_general(positions, data.precision, data.tensor, out.K)
+    kernels.information(positions, data.collapsed, out.K)
     for i in range(3):
         out.K[6 + i, 6 + i] += data.ridge[i]
-    known = data.tables
-    return kernels.reduce(
-        positions, data.weighted, data.base, data.energy, known.rows, known.values, out
-    )
+    return kernels.reduce(positions, data.weighted, data.collapsed, out)
 
 
 @njit(inline="always")
@@ -79,8 +68,8 @@ def fresh_draws(positions, data, found, tile, power):
     """
     logdet, total = collapse(positions, data, found), 0.0
     draws.folded(found.C, tile.quartic)
-    for start in range(0, data.energy.size, draws.TILE):
-        size = min(draws.TILE, data.energy.size - start)
+    for start in range(0, data.mean.shape[1], draws.TILE):
+        size = min(draws.TILE, data.mean.shape[1] - start)
         numbers = draws.drawn(size, tile)
         draws.exponents(start, size, data, tile.quartic, found.b, numbers, tile.exponent)
         total += draws.log_means(size, tile)
@@ -91,7 +80,7 @@ def fresh_draws(positions, data, found, tile, power):
 def repeated(positions, data, rng, count, power, out):
     """Independent realisations of log p-hat at one theta, filling ``out``."""
     for i in range(out.size):
-        found, tile = kernels.reduced(data.energy.size), draws.tile(count, rng)
+        found, tile = kernels.reduced(data.mean.shape[1]), draws.tile(count, rng)
         out[i] = fresh_draws(positions, data, found, tile, power)
 
 
@@ -103,7 +92,7 @@ def transitions(theta, log_target, prior, step, number, power, data, rng, count)
     redrawn, of ``number`` draws of omega. Proposals are the walk (27) of sd ``step``. Returns
     (accepted, log_target).
     """
-    found, tile = kernels.reduced(data.energy.size), draws.tile(number, rng)
+    found, tile = kernels.reduced(data.mean.shape[1]), draws.tile(number, rng)
     positions = np.zeros((theta.size // 3 + 1, 3))
     flat = positions.ravel()[3:]
     accepted = 0

@@ -6,9 +6,9 @@ from typing import Self
 import numpy as np
 
 from imuarray.errors import InputError, require_one_of, require_shape
-from imuarray.estimation.collapsed import Collapsed, tables
+from imuarray.estimation.collapsed import Collapsed
 from imuarray.geometry import positions_of
-from imuarray.model import ArrayModel, structure_tensor
+from imuarray.model import ArrayModel
 from imuarray.posterior.marginal import Marginal
 from imuarray.posterior.prior import GaussianPrior
 from imuarray_papers.posterior import kernels
@@ -58,12 +58,9 @@ class Likelihood:
             if np.isfinite(motion_sd[0]):
                 raise InputError("motion_sd: expected none of omega beside rate_distribution")
         mean = np.ascontiguousarray(mean.T)
-        general = collapsed.weights is None
         data = kernels.LikelihoodData(
-            collapsed.weighted, collapsed.energy, collapsed.base, mean, _lower(covariance),
-            np.empty((10, 0)), np.empty(0) if general else collapsed.weights,
-            np.ascontiguousarray(collapsed.precision) if general else np.empty((0, 0)),
-            np.array(structure_tensor()), tables(), np.full(3, float(motion_sd[1]) ** -2.0),
+            collapsed, collapsed.weighted, mean, _lower(covariance), np.empty((10, 0)),
+            np.full(3, float(motion_sd[1]) ** -2.0),
         )  # fmt: skip
         return cls(data, DETERMINANTS[determinant], collapsed, mean.T, covariance, motion_sd)
 
@@ -92,7 +89,7 @@ class Likelihood:
     @property
     def samples(self) -> int:
         """Number T of samples."""
-        return self.data.energy.size
+        return self.collapsed.samples
 
     def _relative(self, positions) -> np.ndarray:
         positions = np.asarray(positions, float)

@@ -25,7 +25,7 @@ def calibrate_batch(model, rng, count, case, options):
     for place, *one in zip(truth, *readings, strict=True):
         data, positions = Collapsed.of(model, *one), model.array.relative.copy()
         status, cost, _, snapshots = block_descent(
-            data.arrays, positions, options["tolerance"], max(options["marks"]), marks
+            data, positions, options["tolerance"], max(options["marks"]), marks
         )
         squares = np.mean((snapshots - place)[:, 1:] ** 2, axis=(1, 2))
         found.append((squares if status >= 0 else np.nan * squares, len(cost), status))
