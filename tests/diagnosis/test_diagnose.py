@@ -14,7 +14,7 @@ from imuarray.analysis.calibration import calibrate
 from imuarray.cli import main
 from imuarray.diagnosis import procedure
 from imuarray.diagnosis import state as elimination
-from imuarray.diagnosis.document import diagnose, structural_gain
+from imuarray.diagnosis.document import diagnose
 from imuarray.diagnosis.final_checks import beside_left
 from imuarray.diagnosis.fit import log_scores
 from imuarray.diagnosis.noise_effects import verdict
@@ -465,7 +465,7 @@ def test_readings_count_once(effects):
         *effects, kind="pair" if len(effects) > 1 else "one", realistic=True, duration=4
     )
     made = diagnose(make(case, SEED)[0], SEED, replicates=2)
-    parts = {i.effect: structural_gain(made.found, i)[2] for i in made.found.reading_faults}
+    parts = {item.effect: item.blocks for item in made.found.reading_faults}
     assert set(parts) == {name for name, _ in effects}
     assert all(blocks.sum() > 1e5 for blocks in parts.values())
     made_fit = made.extended.fit

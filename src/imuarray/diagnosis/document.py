@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 import imuarray
-from imuarray.diagnosis.fit import Fit, at, fit, log_scores
+from imuarray.diagnosis.fit import Fit, fit, log_scores
 from imuarray.diagnosis.noise import observable, per_triad, standardised
-from imuarray.diagnosis.noise_effects import COLOURED, held_out
+from imuarray.diagnosis.noise_effects import COLOURED
 from imuarray.diagnosis.procedure import ProcedureResult, run_procedure
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
 from imuarray.diagnosis.scores import Information, information_at
@@ -167,8 +167,7 @@ def nats_beside(found: ProcedureResult) -> np.ndarray:
     beside = [item.blocks for item in found.in_noise if item.effect == COLOURED]
     # nor has any model's score the readings left out; exchanged axes are in the rivals' scores,
     # which take the readings as they are
-    left_out = [item for item in found.reading_faults if DATA_EFFECTS[item.effect].left_out]
-    beside += [structural_gain(found, item)[2] for item in left_out]
+    beside += [x.blocks for x in found.reading_faults if DATA_EFFECTS[x.effect].left_out]
     return sum((blocks for blocks in beside if np.sum(blocks) > 0), np.zeros(ENGINE.blocks))
 
 
@@ -250,25 +249,25 @@ def gains(base: Fitted, inflated: Fitted, extended: Fitted) -> dict:
 def causes_of(found: ProcedureResult, sds: np.ndarray) -> list[dict]:
     """All causes: of whole readings, of the means in the order of adoption, of the noise."""
     search, labels = found.search, found.search.readings.labels
-    causes = []
-    for item in found.reading_faults:
-        nats = structural_gain(found, item)[:2]
-        if not item.doubtful or nats[0] > 0:
-            causes.append(_entry(item, labels, item.parameters, nats, says=item.says))
+    means = []
     for cause in search.causes:
         statistic, freedom = need(search, cause.effect)
         true, placebo = placebo_gain(search, cause)
-        causes.append(_entry(
+        means.append(_entry(
             cause, labels, parameters_of(search, cause, sds),
             heldout_gain(search, cause.effect), found.rivals.get(cause.effect, ()),
             chi_square=statistic, degrees_of_freedom=freedom, placebo_gain_nats=placebo,
             gain_in_sample_nats=true,
         ))  # fmt: skip
-    for item in found.in_noise:
-        where = {"stretches_s": [list(pair) for pair in item.where]} if item.where else {}
-        nats = item.gain, item.gain_se
-        causes.append(_entry(item, labels, item.parameters, nats, **where))
-    return causes
+    whole, noise = found.reading_faults, found.in_noise
+    return [*(_of_fault(x, labels) for x in whole), *means, *(_of_fault(x, labels) for x in noise)]
+
+
+def _of_fault(item, labels) -> dict:
+    """Entry of an effect of whole readings, or of the noise."""
+    where = {"stretches_s": [list(pair) for pair in item.where]} if item.where else {}
+    nats = item.gain, item.gain_se
+    return _entry(item, labels, item.parameters, nats, says=item.says, **where)
 
 
 def _entry(item, labels, parameters, nats, rivals=(), says="", **tests) -> dict:
@@ -288,23 +287,6 @@ def _entry(item, labels, parameters, nats, rivals=(), says="", **tests) -> dict:
         **tests,
     }
     return entry | {"says": cause_in_words(entry, labels, says)}
-
-
-def structural_gain(found: ProcedureResult, item) -> tuple[float, float, np.ndarray]:
-    """Nats by which the readings, as recorded, miss the extended model's prediction, as `held_out`.
-
-    Nothing was fitted to the readings that were left out, so this is held out as it stands.
-    What the other effects of whole readings did stays mended: theirs is not counted here.
-    """
-    search, raw = found.search, found.raw
-    touched, values = raw.keep & ~search.allowed, search.readings.values
-    if not DATA_EFFECTS[item.effect].left_out:  # it is mended
-        touched, values = raw.keep & (raw.values != values), raw.values
-    mine = np.zeros_like(touched)
-    mine[:, list(item.imus)] = touched[:, list(item.imus)]
-    readings = replace(search.readings, values=values, keep=search.readings.keep | mine)
-    linearised = at(readings, search.columns, search.active, search.fit.state, all_columns=False)
-    return held_out((linearised.misfits - search.fit.misfits - mine.sum(axis=(1, 2))) / 2)
 
 
 def parameters_of(search: Search, cause: Cause, sds) -> dict:

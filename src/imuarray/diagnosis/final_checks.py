@@ -10,18 +10,19 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis import noise_effects
-from imuarray.diagnosis.fit import Fit
+from imuarray.diagnosis.fit import Fit, at
 from imuarray.diagnosis.noise import Noise
-from imuarray.diagnosis.reading_effects import RAILS, ReadingFault, rails_cause
+from imuarray.diagnosis.reading_effects import RAILS, Fault, rails_cause
 from imuarray.diagnosis.residual_checks import Check, all_checks, normal_checks
 from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search, need
 from imuarray.engine.linearise import linearise
+from imuarray.engine.readings import Readings
 from imuarray.engine.widths import residual_map_mask, spread_of
 from imuarray.linear import scaled_solve
-from imuarray.model.effects import KINDS
+from imuarray.model.effects import DATA_EFFECTS, KINDS
 from imuarray.tails import log_normal
 
 STRICT = ("outliers", "size of", "change of")  # checks that a small residual does not excuse
@@ -75,7 +76,7 @@ def clipped(found: list[Peak], limit: float) -> tuple[list[Peak], float]:
     return hit, least
 
 
-def leave_out_clips(search: Search, without=()) -> tuple[Search, list[ReadingFault]]:
+def leave_out_clips(search: Search, without=()) -> tuple[Search, list[Fault]]:
     """Without readings that fall short of their prediction far more than any other does."""
     hit, log_p = ([], 0.0) if RAILS in without else clipped(peaks(search), SETTINGS.check)
     if not hit:
@@ -89,7 +90,30 @@ def leave_out_clips(search: Search, without=()) -> tuple[Search, list[ReadingFau
     return replace(search, allowed=search.allowed & ~lost), [found]
 
 
-def together(first: list[ReadingFault], second: list[ReadingFault]) -> list[ReadingFault]:
+def with_gains(search: Search, raw: Readings, faults: list[Fault]) -> list[Fault]:
+    """Faults of whole readings with what they gain; without the doubtful ones that gain nothing.
+
+    Nats by which the readings, as recorded (``raw``), miss the extended model's prediction: nothing
+    was fitted to those that were left out, so this is held out as it stands. What the other effects
+    of whole readings did stays mended: theirs is not counted here.
+    """
+    found = []
+    for item in faults:
+        touched, values = raw.keep & ~search.allowed, search.readings.values
+        if not DATA_EFFECTS[item.effect].left_out:  # it is mended
+            touched, values = raw.keep & (raw.values != values), raw.values
+        mine = np.zeros_like(touched)
+        mine[:, list(item.imus)] = touched[:, list(item.imus)]
+        readings = replace(search.readings, values=values, keep=search.readings.keep | mine)
+        made = at(readings, search.columns, search.active, search.fit.state, all_columns=False)
+        nats = (made.misfits - search.fit.misfits - mine.sum(axis=(1, 2))) / 2
+        gain, error, blocks = noise_effects.held_out(nats)
+        if not item.doubtful or gain > 0:
+            found.append(item._replace(gain=gain, gain_se=error, blocks=blocks))
+    return found
+
+
+def together(first: list[Fault], second: list[Fault]) -> list[Fault]:
     """Both lists, what is in both as one cause in the first's words."""
     names = {item.effect: item for item in first}
     for new in second:

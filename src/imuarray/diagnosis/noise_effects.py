@@ -6,27 +6,15 @@ import numpy as np
 
 from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.noise import Noise, expected_ratio, observable
+from imuarray.diagnosis.reading_effects import Fault
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.heldout import blocks_of
+from imuarray.engine.heldout import blocks_of, summed
 from imuarray.engine.normal import uncorrelated
 from imuarray.model.effects import KINDS
 from imuarray.tails import QUARTILE, log_chi_square, log_normal
 
 TAILS, COLOURED = "heavy_tails", "coloured_noise"
 SCALES = tuple(f"{kind}_noise" for kind in KINDS)
-
-
-class NoiseCause(NamedTuple):
-    """A cause in the noise: whose, log p, numbers, and what it gains on held-out time."""
-
-    effect: str
-    imus: tuple[int, ...]
-    log_p: float
-    parameters: dict  # name -> (value, sd, unit)
-    gain: float  # nats
-    gain_se: float
-    blocks: np.ndarray  # nats of each held-out block
-    where: tuple = ()  # (first, last) s of stretches of time
 
 
 class Mixture(NamedTuple):
@@ -49,7 +37,7 @@ def triad(fit: Fit, imu: int, kind: int) -> np.ndarray:
 def held_out(nats) -> tuple[float, float, np.ndarray]:
     """Sum over samples, the standard error that blocks of time show, and the blocks' sums."""
     parts = np.array([nats[block].sum() for block in blocks_of(len(nats))])
-    return float(parts.sum()), float(np.std(parts, ddof=1) * np.sqrt(len(parts))), parts
+    return *summed(parts), parts
 
 
 def verdict(log_ratio, covariance, limit):
@@ -144,7 +132,7 @@ def alike(fit: Fit, noise: Noise, imu: int, kind: int) -> bool:
 
 def noise_scale(
     fit: Fit, noise: Noise, kind: int, limit, least, skip=(), untied=True
-) -> NoiseCause | None:
+) -> Fault | None:
     """The noise of a kind's triads against the declared one, but of IMUs to ``skip``, or None.
 
     ``least`` (N,) log ratios below which a departure is not believed.
@@ -178,7 +166,7 @@ def noise_scale(
         error = ratio * float(np.sqrt(covariance[place, place]))
         numbers[f"ratio_{readings.labels[imu]}"] = (ratio, error, "1")
     imus = tuple(int(k) for k in pairs[chosen, 0])
-    return NoiseCause(SCALES[kind], imus, log_p, numbers, *held_out(nats))
+    return Fault(SCALES[kind], imus, log_p, numbers, *held_out(nats))
 
 
 def mixture(fit: Fit, imu: int, kind: int, without=None) -> Mixture:
@@ -205,7 +193,7 @@ def mixture(fit: Fit, imu: int, kind: int, without=None) -> Mixture:
 
 
 def heavy_tails(fit: Fit, noise: Noise, limit: float):
-    """(NoiseCause or None, hits, others): triads [(imu, kind, Mixture)] with heavy tails.
+    """(Fault or None, hits, others): triads [(imu, kind, Mixture)] with heavy tails.
 
     ``others`` are those where it may be so, once it is so somewhere: each by itself, or all the
     rest of a kind together.
@@ -243,7 +231,7 @@ def heavy_tails(fit: Fit, noise: Noise, limit: float):
     there = {item[:2] for item in hits}
     others = [m for m, may in zip(tried, maybe, strict=True) if may and m[:2] not in there]
     imus = tuple(sorted({imu for imu, *_ in hits}))
-    return NoiseCause(TAILS, imus, float(least), *_numbers(fit, hits)), hits, others
+    return Fault(TAILS, imus, float(least), *_numbers(fit, hits)), hits, others
 
 
 def _all_tails(gains) -> float:
@@ -288,7 +276,7 @@ def pooled_autocorrelation(fit: Fit, noise: Noise, lagged) -> float:
     return min(found)
 
 
-def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> NoiseCause | None:
+def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Fault | None:
     """Noise correlated in time: neighbours alike, and a spectrum that agrees with it.
 
     ``untied``: no check ties the residual to the motion; else only the spectrum above it counts.
@@ -337,4 +325,4 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> NoiseCause |
         nats[1:] += np.sum(unit[1:] ** 2 - jump - np.log1p(-(rho**2)), axis=1) / 2
     imus = tuple(sorted({int(imu) for imu in triads[far, 0]}))
     best = min(*logs, together, 0.0)
-    return NoiseCause(COLOURED, imus, best, numbers, *held_out(nats))
+    return Fault(COLOURED, imus, best, numbers, *held_out(nats))

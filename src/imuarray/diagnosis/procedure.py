@@ -13,11 +13,12 @@ from imuarray.diagnosis.final_checks import (
     final_checks,
     leave_out_clips,
     together,
+    with_gains,
     within_tolerance,
 )
 from imuarray.diagnosis.fit import Fit, fit
-from imuarray.diagnosis.noise_effects import COLOURED, SCALES, TAILS, NoiseCause
-from imuarray.diagnosis.reading_effects import ReadingFault, find_reading_faults
+from imuarray.diagnosis.noise_effects import COLOURED, SCALES, TAILS
+from imuarray.diagnosis.reading_effects import Fault, find_reading_faults
 from imuarray.diagnosis.residual_checks import Check, all_checks
 from imuarray.diagnosis.scores import Score, detectable
 from imuarray.diagnosis.settings import SETTINGS
@@ -40,8 +41,8 @@ class ProcedureResult:
     search: Search
     base: Fit
     base_scores: list[Score]
-    reading_faults: list[ReadingFault]
-    in_noise: list[NoiseCause]
+    reading_faults: list[Fault]
+    in_noise: list[Fault]
     checks: list[Check]
     explained: float  # share of the base model's excess misfit
     unexplained: bool  # whether checks fail beyond tolerance
@@ -74,6 +75,7 @@ def run_procedure(
     if not corrected:
         checks = all_checks(search.fit, search.given, search.noise)
         search = replace(search, detectable=detectable(search))
+        faults = with_gains(search, raw, faults)
         return ProcedureResult(search, base, scores, faults, [], checks, 0.0, True, raw, whole)
     before, search = search.fit, drop_outliers(search)
     first = first if search.fit is before else None
@@ -107,12 +109,12 @@ def run_procedure(
     notify("looking for what cannot be distinguished")
     classes = {cause.effect: rivals(search, cause) for cause in search.causes}
     return ProcedureResult(
-        search, base, scores, together(faults, clips), in_noise, checks, explained,
-        failing, raw, whole, classes,
+        search, base, scores, with_gains(search, raw, together(faults, clips)), in_noise, checks,
+        explained, failing, raw, whole, classes,
     )  # fmt: skip
 
 
-def ended(search: Search, without, tailed) -> tuple[Search, list[Check], list[NoiseCause]]:
+def ended(search: Search, without, tailed) -> tuple[Search, list[Check], list[Fault]]:
     """The search with the colour of its noise, the checks of what is left, causes in the noise."""
     search = fit_coloured_noise(search, without)
     checks = final_checks(search, tailed)
@@ -223,7 +225,7 @@ def fit_coloured_noise(search: Search, without) -> Search:
     return replace(search, readings=readings).ending(made, noise)
 
 
-def named_noise(search: Search, without, tailed, untied: bool) -> list[NoiseCause]:
+def named_noise(search: Search, without, tailed, untied: bool) -> list[Fault]:
     """Scale and colour of the noise, where they depart from what is declared."""
     found, made, readings = [], beside_left(search)[0], search.readings
     for kind, name in enumerate(SCALES):

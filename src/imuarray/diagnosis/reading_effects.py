@@ -14,7 +14,7 @@ from imuarray.motion.state import lever
 from imuarray.recording.record import AXES
 from imuarray.tails import log_poisson
 
-RAILS = "saturation"
+RAILS, SWAP = "saturation", "axis_swap"
 UNITS = ("m s-2", "rad s-1")  # of the two kinds
 TURNS = [
     np.array(signs)[:, None] * np.eye(3)[list(order)]
@@ -22,27 +22,29 @@ TURNS = [
 ]  # fmt: skip
 
 
-class ReadingFault(NamedTuple):
-    """One such effect: whose, log p, its numbers and the words for what was read."""
+class Fault(NamedTuple):
+    """An effect of whole readings or of the noise: whose, log p, what it gains on held-out time."""
 
     effect: str
     imus: tuple[int, ...]
     log_p: float
     parameters: dict  # name -> (value, sd, unit)
-    says: str
-    doubtful: bool = False  # named only where it gains on held-out time
+    gain: float = 0.0  # nats
+    gain_se: float = 0.0
+    blocks: np.ndarray | None = None  # nats of each held-out block
+    says: str = ""  # of readings, what was read
+    doubtful: bool = False  # named only where it gains
+    where: tuple = ()  # (first, last) s of stretches of time
 
 
-def part(readings: Readings, kind: int) -> np.ndarray:
-    """The readings of the accelerometers (0) or the gyroscopes (1), (T, N, 3)."""
-    return readings.values[..., 3 * kind : 3 * kind + 3]
+def triads(values) -> np.ndarray:
+    """(T, N, 2, 3), a view: accelerometers and gyroscopes of values (T, N, 6)."""
+    return values.reshape(*values.shape[:2], 2, 3)
 
 
 def find_repeats(readings: Readings):
     """Triads that repeat their former sample: (causes, lost (T, N, 6) bool)."""
-    together = np.diff(readings.run) == 0
-    lost = np.zeros(readings.values.shape, bool)
-    hit, shares, logs = [], [], []
+    together, lost, found = np.diff(readings.run) == 0, np.zeros(readings.values.shape, bool), []
     for imu, kind in np.argwhere(readings.exists):
         values = _as_read(readings, imu, kind)
         close = np.abs(np.diff(values, axis=0)) <= SETTINGS.equal * (1 + np.abs(values[1:]))
@@ -51,24 +53,21 @@ def find_repeats(readings: Readings):
         log_p = log_poisson(every.sum(), max(_by_chance(same, every), 1e-9 * together.sum()))
         if every.sum() >= SETTINGS.least_repeats and log_p < SETTINGS.rare_repeats:
             # after a gap, the sample before is not at hand
-            lost[1:, imu, 3 * kind : 3 * kind + 3] = (every | ~together)[:, None]
-            hit.append(int(imu))
-            shares.append(every.mean())
-            logs.append(log_p)
-    if not hit:
+            triads(lost)[1:, imu, kind] = (every | ~together)[:, None]
+            found.append((int(imu), every.mean(), float(log_p)))
+    if not found:
         return [], lost
+    imus, shares, logs = zip(*found, strict=True)
     numbers = {"share": (float(np.mean(shares)), float(np.std(shares)), "1")}
     says = f"{100 * np.mean(shares):.2g} % of the readings repeat the one before exactly"
     # a coarse converter at rest repeats itself, too, and is right
-    found = ReadingFault(
-        "stale_samples", tuple(sorted({*hit})), float(min(logs)), numbers, says, doubtful=True
-    )
-    return [found], lost
+    imus = tuple(sorted({*imus}))
+    return [Fault("stale_samples", imus, min(logs), numbers, says=says, doubtful=True)], lost
 
 
 def _as_read(readings: Readings, imu: int, kind: int) -> np.ndarray:
     """Readings (T, 3) of a triad without first order's map, which mixes its axes' steps."""
-    values, left = part(readings, kind)[:, imu], readings.left
+    values, left = triads(readings.values)[:, imu, kind], readings.left
     removed = [] if left is None or left.removed is None else left.removed.reshape(-1, 3, 3)
     place = kind * readings.array.accelerometers + imu
     return values @ np.linalg.inv(removed[place]).T if place < len(removed) else values
@@ -83,23 +82,20 @@ def _by_chance(same, every) -> float:
 
 def find_rails(readings: Readings):
     """Readings of one triad or several that pile up below the declared range: (causes, lost)."""
-    lost = np.zeros(readings.values.shape, bool)
-    found, logs = [], []
+    lost, found, logs = np.zeros(readings.values.shape, bool), [], []
+    sizes = triads(np.where(readings.keep, np.abs(readings.values), 0.0))
     for kind in range(len(KINDS)):
         there = np.flatnonzero(readings.exists[:, kind])
-        if not len(there):
-            continue
-        chance = len(there) * _tied(readings, kind)
-        sizes = [_sizes(readings, imu, kind) for imu in there]
-        tops = [float(size.max()) for size in sizes]
-        at = [(size >= size.max() * (1 - SETTINGS.same)) & (size > 0) for size in sizes]
-        counts = np.array([here.sum() for here in at])
-        for imu, size, top, here in zip(there, sizes, tops, at, strict=True):
-            count = counts[np.isclose(tops, top, rtol=SETTINGS.same, atol=0.0)].sum()
+        chance, own = len(there) * _tied(readings, kind), sizes[:, there, kind]
+        tops = own.max(axis=(0, 2))
+        at = (own >= tops[:, None] * (1 - SETTINGS.same)) & (own > 0)
+        counts = at.sum(axis=(0, 2))
+        for place, imu in enumerate(there):
+            count = counts[np.isclose(tops, tops[place], rtol=SETTINGS.same, atol=0.0)].sum()
             log_p = float(log_poisson(count - 1, chance) + np.log(len(there)))
-            if log_p < SETTINGS.check or _piles(size, here):
-                lost[:, imu, 3 * kind : 3 * kind + 3] = here
-                found.append((int(imu), kind, top))
+            if log_p < SETTINGS.check or _piles(own[:, place], at[:, place]):
+                triads(lost)[:, imu, kind] = at[:, place]
+                found.append((int(imu), kind, float(tops[place])))
                 logs.append(float(np.clip(log_p, SETTINGS.least_log, SETTINGS.check)))
     if not found:
         return [], lost
@@ -107,21 +103,15 @@ def find_rails(readings: Readings):
     return [rails_cause(found, min(logs), says)], lost
 
 
-def _sizes(readings: Readings, imu: int, kind: int) -> np.ndarray:
-    """(T, 3) of a triad's readings, 0 where they do not count."""
-    kept = readings.keep[:, imu, 3 * kind : 3 * kind + 3]
-    return np.where(kept, np.abs(part(readings, kind)[:, imu]), 0.0)
-
-
 def _tied(readings: Readings, kind: int) -> float:
     """Share of a kind's readings that another equals: a coarse converter's are, by chance."""
     every = max(len(readings.time) // SETTINGS.searched, 1)
-    block = np.s_[::every, :, 3 * kind : 3 * kind + 3]
-    some = np.abs(readings.values[block][readings.keep[block]])
+    values, keep = (triads(x[::every])[:, :, kind] for x in (readings.values, readings.keep))
+    some = np.abs(values[keep])
     return (1 + some.size - np.unique(some).size) / max(some.size, 1)
 
 
-def rails_cause(found, log_p: float, says: str) -> ReadingFault:
+def rails_cause(found, log_p: float, says: str) -> Fault:
     """The cause of triads (imu, kind, rail in SI) whose readings a rail clips."""
     numbers = {}
     for kind, name in enumerate(KINDS):
@@ -130,7 +120,7 @@ def rails_cause(found, log_p: float, says: str) -> ReadingFault:
             numbers[f"{name}_rail"] = float(np.median(sizes)), float(np.std(sizes)), UNITS[kind]
     where = ", ".join(f"{n} {v[0]:.4g} {v[2]}" for n, v in numbers.items())
     imus = tuple(sorted({imu for imu, *_ in found}))
-    return ReadingFault(RAILS, imus, log_p, numbers, f"{says} ({where})")
+    return Fault(RAILS, imus, log_p, numbers, says=f"{says} ({where})")
 
 
 def _piles(size, at) -> bool:
@@ -155,18 +145,20 @@ def find_swaps(readings: Readings):
     lever = np.zeros((len(readings.time), count, 3))
     for kind in (1, 0):
         there = np.flatnonzero(readings.exists[:, kind])
-        values = part(readings, kind)
-        against = {j: _against(values, lever, j, there) for j in there}
-        best = max(there, key=lambda j: sum(map(_is_straight, against[j].values())))
-        agreeing = [k for k in there if _is_straight(against[best][k])]
+        values = triads(readings.values)[:, :, kind]
+        own = values - lever
+        # by each triad, those that agree where it is right
+        agreeing = max((
+            [k for k in there if _is_straight(_nearest(own[:, j] + lever[:, k], values[:, k])[0])]
+            for j in there
+        ), key=len)  # fmt: skip
         if 2 * len(agreeing) <= len(there) and len(there) > 2:
             corrected = False
             hit += [(int(k), kind) for k in there]
             continue
-        common = np.median(values[:, agreeing] - lever[:, agreeing], axis=1)
+        common = np.median(own[:, agreeing], axis=1)
         for imu in there:
-            matrix = _matrix(common + lever[:, imu], values[:, imu])
-            nearest = min(TURNS, key=lambda turn: np.linalg.norm(turn - matrix))
+            nearest, matrix = _nearest(common + lever[:, imu], values[:, imu])
             limit = min(SETTINGS.near_turn, np.linalg.norm(matrix - np.eye(3)) / 2)
             if not _is_straight(nearest) and np.linalg.norm(matrix - nearest) < limit:
                 turns[imu, kind] = nearest
@@ -182,21 +174,13 @@ def find_swaps(readings: Readings):
         turns[:] = np.eye(3)
         says = "no majority of the triads agrees on the axes: put them right first"
     imus = tuple(sorted({imu for imu, _ in hit}))
-    return [ReadingFault(SWAP, imus, -1e6, {}, says)], turns, corrected
+    return [Fault(SWAP, imus, -1e6, {}, says=says)], turns, corrected
 
 
-def _matrix(reference, values) -> np.ndarray:
-    """The matrix that turns a reference (T, 3) into a triad's readings (T, 3)."""
-    return np.linalg.lstsq(reference, values, rcond=None)[0].T
-
-
-def _against(values, lever, one, there) -> dict:
-    """Signed permutations nearest to what each triad reads where triad ``one`` is right."""
-    found = {}
-    for k in there:
-        matrix = _matrix(values[:, one] - lever[:, one] + lever[:, k], values[:, k])
-        found[k] = min(TURNS, key=lambda turn: np.linalg.norm(turn - matrix))
-    return found
+def _nearest(reference, values) -> tuple[np.ndarray, np.ndarray]:
+    """(nearest signed permutation, matrix) that turns a reference (T, 3) into readings (T, 3)."""
+    matrix = np.linalg.lstsq(reference, values, rcond=None)[0].T
+    return min(TURNS, key=lambda turn: np.linalg.norm(turn - matrix)), matrix
 
 
 def _is_straight(turn) -> bool:
@@ -217,9 +201,6 @@ def _axes(turn) -> str:
     return f"reads ({', '.join(names)})"
 
 
-SWAP = "axis_swap"
-
-
 def find_reading_faults(readings: Readings, without=()):
     """(causes, readings put right, whether they could be): axes turned back, the rest left out."""
     causes, corrected = [], True
@@ -233,9 +214,6 @@ def find_reading_faults(readings: Readings, without=()):
         found, turns, corrected = find_swaps(part_of(readings, SETTINGS.searched))
         causes += found
         if found:
-            values = readings.values.copy()
-            for imu, kind in np.argwhere(readings.exists):
-                block = np.s_[:, imu, 3 * kind : 3 * kind + 3]
-                values[block] = readings.values[block] @ turns[imu, kind]
+            values = (triads(readings.values)[..., None, :] @ turns).reshape(readings.values.shape)
             readings = replace(readings, values=values)
     return causes, readings, corrected

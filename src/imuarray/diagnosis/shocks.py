@@ -11,7 +11,8 @@ from scipy import special
 from scipy.ndimage import binary_propagation
 
 from imuarray.diagnosis.fit import Fit
-from imuarray.diagnosis.noise_effects import NoiseCause, held_out
+from imuarray.diagnosis.noise_effects import held_out
+from imuarray.diagnosis.reading_effects import Fault
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.tails import log_poisson
 
@@ -44,7 +45,7 @@ def misfits(fit: Fit) -> Misfit:
     return Misfit(whole / size, least / size, worst, freedom, rest)
 
 
-def find_shocks(fit: Fit, limit: float) -> tuple[NoiseCause | None, np.ndarray]:
+def find_shocks(fit: Fit, limit: float) -> tuple[Fault | None, np.ndarray]:
     """The cause and its samples (T,) bool, none where it is not there.
 
     Samples where two IMUs or more are far off must be more than those of single IMUs make by
@@ -71,7 +72,7 @@ def find_shocks(fit: Fit, limit: float) -> tuple[NoiseCause | None, np.ndarray]:
     nats = np.where(shaken, (found.least - rest) / 2, 0.0)
     imus = tuple(range(fit.residual.shape[1]))
     where = tuple(_stretches(fit.readings.time + fit.readings.origin, fit.readings.run, shaken))
-    return NoiseCause(SHOCK, imus, log_p, numbers, *held_out(nats), where=where), shaken
+    return Fault(SHOCK, imus, log_p, numbers, *held_out(nats), where=where), shaken
 
 
 def with_neighbours(shaken, run, number: int) -> np.ndarray:
