@@ -7,7 +7,7 @@ import pytest
 
 from imuarray.diagnosis.final_checks import Peak, clipped, together
 from imuarray.diagnosis.procedure import run_procedure
-from imuarray.diagnosis.reading_effects import Fault
+from imuarray.diagnosis.reading_effects import Finding
 from imuarray_papers.blind.cases import Case, make
 
 LIMIT = -7.5
@@ -61,9 +61,9 @@ def test_false_alarms_in_noise():
 
 
 def test_findings_of_both_kinds_are_one_cause():
-    old = Fault("saturation", (1, 4), -20.0, {}, says="piles")
-    new = Fault("saturation", (2,), -30.0, {}, says="alone")
-    other = Fault("stale_samples", (0,), -40.0, {}, says="repeats")
+    old = Finding("saturation", (1, 4), -20.0, {}, says="piles")
+    new = Finding("saturation", (2,), -30.0, {}, says="alone")
+    other = Finding("stale_samples", (0,), -40.0, {}, says="repeats")
     merged = together([old, other], [new])
     assert merged == [old._replace(imus=(1, 2, 4), log_p=-30.0), other]
 

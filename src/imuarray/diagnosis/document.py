@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 
 import imuarray
+from imuarray import words
 from imuarray.diagnosis.fit import Fit, fit, log_scores
 from imuarray.diagnosis.noise import observable, per_triad, standardised
 from imuarray.diagnosis.noise_effects import COLOURED
 from imuarray.diagnosis.procedure import ProcedureResult, run_procedure
+from imuarray.diagnosis.reading_effects import Finding
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
 from imuarray.diagnosis.scores import Information, information_at
 from imuarray.diagnosis.settings import SETTINGS
@@ -31,16 +33,6 @@ from imuarray.recording import Recording
 from imuarray.recording.channels import require_live
 from imuarray.streams import stream
 from imuarray.threads import one_thread
-from imuarray.words import (
-    NARROW,
-    first_up,
-    in_short,
-    joined,
-    plus_minus,
-    probability,
-    sensors_of,
-    spelled,
-)
 
 LEAST = -1e6  # log p; JSON has no infinity
 
@@ -248,45 +240,37 @@ def gains(base: Fitted, inflated: Fitted, extended: Fitted) -> dict:
 
 def causes_of(found: ProcedureResult, sds: np.ndarray) -> list[dict]:
     """All causes: of whole readings, of the means in the order of adoption, of the noise."""
-    search, labels = found.search, found.search.readings.labels
-    means = []
+    search, means = found.search, []
     for cause in search.causes:
         statistic, freedom = need(search, cause.effect)
         true, placebo = placebo_gain(search, cause)
-        means.append(_entry(
-            cause, labels, parameters_of(search, cause, sds),
-            heldout_gain(search, cause.effect), found.rivals.get(cause.effect, ()),
-            chi_square=statistic, degrees_of_freedom=freedom, placebo_gain_nats=placebo,
-            gain_in_sample_nats=true,
+        means.append(Finding(
+            cause.effect, cause.imus, cause.log_p, parameters_of(search, cause, sds),
+            *heldout_gain(search, cause.effect), rivals=found.rivals.get(cause.effect, ()),
+            also={"chi_square": statistic, "degrees_of_freedom": freedom,
+                  "placebo_gain_nats": placebo, "gain_in_sample_nats": true},
         ))  # fmt: skip
-    whole, noise = found.reading_faults, found.in_noise
-    return [*(_of_fault(x, labels) for x in whole), *means, *(_of_fault(x, labels) for x in noise)]
+    every = (*found.reading_faults, *means, *found.in_noise)
+    return [_entry(item, search.readings.labels) for item in every]
 
 
-def _of_fault(item, labels) -> dict:
-    """Entry of an effect of whole readings, or of the noise."""
-    where = {"stretches_s": [list(pair) for pair in item.where]} if item.where else {}
-    nats = item.gain, item.gain_se
-    return _entry(item, labels, item.parameters, nats, says=item.says, **where)
-
-
-def _entry(item, labels, parameters, nats, rivals=(), says="", **tests) -> dict:
-    """One cause of `diagnosis.json`; ``parameters`` {name: (value, sd, unit)}."""
+def _entry(item: Finding, labels) -> dict:
+    """One cause of `diagnosis.json`."""
     entry = {
         "effect": item.effect,
-        "sensors": sensors_of(labels, item.imus),
+        "sensors": words.sensors_of(labels, item.imus),
         "parameters": {
             name: {"value": value, "sd": sd, "unit": unit}
-            for name, (value, sd, unit) in parameters.items()
+            for name, (value, sd, unit) in item.parameters.items()
         },
         "p_value": float(np.exp(item.log_p)),
         "log10_p_value": float(max(item.log_p, LEAST) / np.log(10)),
-        "heldout_gain_nats": nats[0],
-        "heldout_gain_se": nats[1],
-        "indistinguishable_from": list(rivals),
-        **tests,
+        "heldout_gain_nats": item.gain,
+        "heldout_gain_se": item.gain_se,
+        "indistinguishable_from": list(item.rivals),
+        **item.also,
     }
-    return entry | {"says": cause_in_words(entry, labels, says)}
+    return entry | {"says": cause_in_words(entry, labels, item.says)}
 
 
 def parameters_of(search: Search, cause: Cause, sds) -> dict:
@@ -309,20 +293,20 @@ def parameters_of(search: Search, cause: Cause, sds) -> dict:
 
 def cause_in_words(cause: dict, labels, says: str = "") -> str:
     """A cause of `diagnosis.json` with its size, or what was read (``says``), test and class."""
-    text = in_short(cause, labels, says)
+    text = words.in_short(cause, labels, says)
     if stretches := cause.get("stretches_s"):
         first = [f"{a:.4g} to {b:.4g}" for a, b in stretches[: SETTINGS.stretches_stated]]
         text += f"; longest at {', '.join(first)} s"
-    gain = plus_minus(cause["heldout_gain_nats"], cause["heldout_gain_se"])
-    p_value = probability(cause["log10_p_value"])
-    equals = "" if p_value.startswith("<") else f"={NARROW}"
-    text += f". Gain on held-out time {gain} nats, p{NARROW}{equals}{p_value}."
+    gain = words.plus_minus(cause["heldout_gain_nats"], cause["heldout_gain_se"])
+    p_value = words.probability(cause["log10_p_value"])
+    equals = "" if p_value.startswith("<") else f"={words.NARROW}"
+    text += f". Gain on held-out time {gain} nats, p{words.NARROW}{equals}{p_value}."
     true, placebo = cause.get("gain_in_sample_nats", 0.0), cause.get("placebo_gain_nats", 0.0)
     if cause["sensors"] != ["all"] and 0 < SETTINGS.doubtful * true < placebo:
         text += (
             " Its placebo, the same numbers at other IMUs, gains too: it is doubtful whose it is."
         )
     if cause["indistinguishable_from"]:
-        rivals = joined(spelled(name) for name in cause["indistinguishable_from"])
+        rivals = words.joined(words.spelled(name) for name in cause["indistinguishable_from"])
         text += f" On this recording it cannot be distinguished from {rivals}: one class."
-    return first_up(text)
+    return words.first_up(text)

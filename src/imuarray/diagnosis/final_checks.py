@@ -12,7 +12,7 @@ import numpy as np
 from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.fit import Fit, at
 from imuarray.diagnosis.noise import Noise
-from imuarray.diagnosis.reading_effects import RAILS, Fault, rails_cause
+from imuarray.diagnosis.reading_effects import RAILS, Finding, rails_cause, triads
 from imuarray.diagnosis.residual_checks import Check, all_checks, normal_checks
 from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
@@ -42,19 +42,18 @@ class Peak(NamedTuple):
 
 def peaks(search: Search) -> list[Peak]:
     """Peaks of every triad."""
-    residual, readings, found = search.fit.residual, search.readings, []
-    for imu, kind in np.argwhere(readings.exists):
-        block = np.s_[:, imu, 3 * kind : 3 * kind + 3]
-        kept, values = readings.keep[block], readings.values[block]
+    parts, found = (search.readings.keep, search.readings.values, search.fit.residual), []
+    for imu, kind in np.argwhere(search.readings.exists):
+        kept, values, residual = (triads(part)[:, imu, kind] for part in parts)
         size = np.where(kept, np.abs(values), 0.0)
         at = size >= size.max() * (1 - 1e-9)
-        short = -np.sign(values) * residual[block]
+        short = -np.sign(values) * residual
         rest = kept & ~at
         # what bends all large readings alike is no rail
         near = short[rest][np.argsort(size[rest])[-SETTINGS.next_largest :]]
         spread = max(float(np.std(near)), 1.0) * np.sqrt(1 + 1 / SETTINGS.next_largest)
         inward = float(np.max(short[at]))
-        others = float(np.max(np.abs(residual[block])[rest]))
+        others = float(np.max(np.abs(residual)[rest]))
         apart = (inward - float(np.mean(near))) / spread
         found.append(Peak(int(imu), int(kind), at, float(size.max()), inward, others, apart))
     return found
@@ -62,11 +61,11 @@ def peaks(search: Search) -> list[Peak]:
 
 def clipped(found: list[Peak], limit: float) -> tuple[list[Peak], float]:
     """Peaks that fall short far more than anything else does, or all of a kind together."""
-    logs = {id(p): float(log_normal(p.inward) + np.log(len(found))) for p in found}
     # two at one value are more than an outlier
-    least_off = {id(p): p.others * (SETTINGS.alone if p.at.sum() == 1 else 1.0) for p in found}
-    hit = [p for p in found if logs[id(p)] < limit and p.inward > least_off[id(p)]]
-    least = min((logs[id(p)] for p in hit), default=0.0)
+    off = [p for p in found if p.inward > p.others * (SETTINGS.alone if p.at.sum() == 1 else 1.0)]
+    logs = [float(log_normal(p.inward) + np.log(len(found))) for p in off]
+    hit = [p for p, log_p in zip(off, logs, strict=True) if log_p < limit]
+    least = min((log_p for log_p in logs if log_p < limit), default=0.0)
     for kind in range(len(KINDS)):
         own = [p for p in found if p.kind == kind]
         pooled = sum(p.apart for p in own) / np.sqrt(max(len(own), 1))
@@ -76,21 +75,24 @@ def clipped(found: list[Peak], limit: float) -> tuple[list[Peak], float]:
     return hit, least
 
 
-def leave_out_clips(search: Search, without=()) -> tuple[Search, list[Fault]]:
-    """Without readings that fall short of their prediction far more than any other does."""
+def leave_out_clips(search: Search, faults, without=()) -> tuple[Search, list[Finding]]:
+    """Without readings that fall short of their prediction far more than any other does.
+
+    And the ``faults`` of readings with theirs.
+    """
     hit, log_p = ([], 0.0) if RAILS in without else clipped(peaks(search), SETTINGS.check)
     if not hit:
-        return search, []
+        return search, faults
     lost = np.zeros(search.readings.keep.shape, bool)
     for peak in hit:
-        lost[:, peak.imu, 3 * peak.kind : 3 * peak.kind + 3] = peak.at
+        triads(lost)[:, peak.imu, peak.kind] = peak.at
     search = replace(search, readings=search.readings.without(lost)).refit()
     says = "the largest reading alone stays below what it should be, as at a rail"
     found = rails_cause([(peak.imu, peak.kind, peak.size) for peak in hit], log_p, says)
-    return replace(search, allowed=search.allowed & ~lost), [found]
+    return replace(search, allowed=search.allowed & ~lost), together(faults, [found])
 
 
-def with_gains(search: Search, raw: Readings, faults: list[Fault]) -> list[Fault]:
+def with_gains(search: Search, raw: Readings, faults: list[Finding]) -> list[Finding]:
     """Faults of whole readings with what they gain; without the doubtful ones that gain nothing.
 
     Nats by which the readings, as recorded (``raw``), miss the extended model's prediction: nothing
@@ -113,7 +115,7 @@ def with_gains(search: Search, raw: Readings, faults: list[Fault]) -> list[Fault
     return found
 
 
-def together(first: list[Fault], second: list[Fault]) -> list[Fault]:
+def together(first: list[Finding], second: list[Finding]) -> list[Finding]:
     """Both lists, what is in both as one cause in the first's words."""
     names = {item.effect: item for item in first}
     for new in second:
@@ -125,14 +127,12 @@ def together(first: list[Fault], second: list[Fault]) -> list[Fault]:
 
 def lone_checks(made: Fit, tailed) -> list[Check]:
     """The reading farthest from its prediction, but for triads whose tails are known."""
-    known = {(imu, kind) for imu, kind, _ in tailed}
     size = np.abs(made.residual)
-    for imu, kind in known:
-        size[:, imu, 3 * kind : 3 * kind + 3] = 0.0
+    for imu, kind, _ in tailed:
+        triads(size)[:, imu, kind] = 0.0
     place = np.unravel_index(int(np.argmax(size)), size.shape)
-    farthest = float(size[place])
-    log_p = float(log_normal(farthest) + np.log(2 * size.size))
-    return [Check("farthest reading", farthest, min(log_p, 0.0), (int(place[1]),))]
+    log_p = log_normal(size[place]) + np.log(2 * size.size)
+    return [Check.of("farthest reading", size[place], log_p, place[1])]
 
 
 def beside_left(search: Search) -> tuple[Fit, Information]:
@@ -186,7 +186,7 @@ def outlier_checks(search: Search) -> list[Check]:
     for imu, kind in np.argwhere(whole.exists):
         own = products[:, imu, kind].sum(axis=1)
         if np.count_nonzero(own) > SETTINGS.few:
-            found.append((int(imu), float(own.sum() / np.sqrt(np.sum(own**2)))))
+            found.append((imu, own.sum() / np.sqrt(np.sum(own**2))))
     return [normal_checks("outliers against the reading's change", found)] if found else []
 
 
@@ -198,9 +198,8 @@ def plausibility_checks(search: Search) -> list[Check]:
         free = search.active[:, columns.of(cause.effect)]
         sizes = np.where(free, np.abs(whole[:, columns.of(cause.effect)]), 0.0)
         if sizes.max() > SETTINGS.implausible:
-            imu = int(np.argmax(sizes.max(axis=1)))
-            largest, name = float(sizes.max()), f"size of {cause.effect}"
-            found.append(Check(name, largest, float(log_normal(largest)), (imu,)))
+            imu, name = np.argmax(sizes.max(axis=1)), f"size of {cause.effect}"
+            found.append(Check.of(name, sizes.max(), log_normal(sizes.max()), imu))
     return found
 
 
@@ -209,7 +208,7 @@ def tail_checks(made: Fit, noise: Noise, tailed) -> list[Check]:
     there = {(imu, kind) for imu, kind, _ in tailed}
     named, hits, _ = noise_effects.heavy_tails(made, noise, SETTINGS.check)
     left = sorted({imu for imu, kind, _ in hits if (imu, kind) not in there})
-    return [Check("outliers' mixture", len(left), named.log_p, tuple(left))] if left else []
+    return [Check.of("outliers' mixture", len(left), named.log_p, *left)] if left else []
 
 
 def within_tolerance(search: Search, checks, in_noise) -> tuple[float, bool]:

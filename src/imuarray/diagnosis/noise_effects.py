@@ -6,7 +6,7 @@ import numpy as np
 
 from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.noise import Noise, expected_ratio, observable
-from imuarray.diagnosis.reading_effects import Fault
+from imuarray.diagnosis.reading_effects import Finding
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.heldout import blocks_of, summed
 from imuarray.engine.normal import uncorrelated
@@ -132,7 +132,7 @@ def alike(fit: Fit, noise: Noise, imu: int, kind: int) -> bool:
 
 def noise_scale(
     fit: Fit, noise: Noise, kind: int, limit, least, skip=(), untied=True
-) -> Fault | None:
+) -> Finding | None:
     """The noise of a kind's triads against the declared one, but of IMUs to ``skip``, or None.
 
     ``least`` (N,) log ratios below which a departure is not believed.
@@ -166,7 +166,7 @@ def noise_scale(
         error = ratio * float(np.sqrt(covariance[place, place]))
         numbers[f"ratio_{readings.labels[imu]}"] = (ratio, error, "1")
     imus = tuple(int(k) for k in pairs[chosen, 0])
-    return Fault(SCALES[kind], imus, log_p, numbers, *held_out(nats))
+    return Finding(SCALES[kind], imus, log_p, numbers, *held_out(nats))
 
 
 def mixture(fit: Fit, imu: int, kind: int, without=None) -> Mixture:
@@ -193,7 +193,7 @@ def mixture(fit: Fit, imu: int, kind: int, without=None) -> Mixture:
 
 
 def heavy_tails(fit: Fit, noise: Noise, limit: float):
-    """(Fault or None, hits, others): triads [(imu, kind, Mixture)] with heavy tails.
+    """(Finding or None, hits, others): triads [(imu, kind, Mixture)] with heavy tails.
 
     ``others`` are those where it may be so, once it is so somewhere: each by itself, or all the
     rest of a kind together.
@@ -231,7 +231,7 @@ def heavy_tails(fit: Fit, noise: Noise, limit: float):
     there = {item[:2] for item in hits}
     others = [m for m, may in zip(tried, maybe, strict=True) if may and m[:2] not in there]
     imus = tuple(sorted({imu for imu, *_ in hits}))
-    return Fault(TAILS, imus, float(least), *_numbers(fit, hits)), hits, others
+    return Finding(TAILS, imus, float(least), *_numbers(fit, hits)), hits, others
 
 
 def _all_tails(gains) -> float:
@@ -276,7 +276,7 @@ def pooled_autocorrelation(fit: Fit, noise: Noise, lagged) -> float:
     return min(found)
 
 
-def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Fault | None:
+def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Finding | None:
     """Noise correlated in time: neighbours alike, and a spectrum that agrees with it.
 
     ``untied``: no check ties the residual to the motion; else only the spectrum above it counts.
@@ -325,4 +325,4 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Fault | None
         nats[1:] += np.sum(unit[1:] ** 2 - jump - np.log1p(-(rho**2)), axis=1) / 2
     imus = tuple(sorted({int(imu) for imu in triads[far, 0]}))
     best = min(*logs, together, 0.0)
-    return Fault(COLOURED, imus, best, numbers, *held_out(nats))
+    return Finding(COLOURED, imus, best, numbers, *held_out(nats))

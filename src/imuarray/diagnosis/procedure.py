@@ -12,13 +12,12 @@ from imuarray.diagnosis.final_checks import (
     beside_left,
     final_checks,
     leave_out_clips,
-    together,
     with_gains,
     within_tolerance,
 )
 from imuarray.diagnosis.fit import Fit, fit
 from imuarray.diagnosis.noise_effects import COLOURED, SCALES, TAILS
-from imuarray.diagnosis.reading_effects import Fault, find_reading_faults
+from imuarray.diagnosis.reading_effects import Finding, find_reading_faults
 from imuarray.diagnosis.residual_checks import Check, all_checks
 from imuarray.diagnosis.scores import Score, detectable
 from imuarray.diagnosis.settings import SETTINGS
@@ -41,8 +40,8 @@ class ProcedureResult:
     search: Search
     base: Fit
     base_scores: list[Score]
-    reading_faults: list[Fault]
-    in_noise: list[Fault]
+    reading_faults: list[Finding]
+    in_noise: list[Finding]
     checks: list[Check]
     explained: float  # share of the base model's excess misfit
     unexplained: bool  # whether checks fail beyond tolerance
@@ -83,7 +82,7 @@ def run_procedure(
     search = adopt(search, first).light()
     notify("fitting to the end")
     search = eliminate(search.refit(rough=False))
-    search, clips = leave_out_clips(search, without)
+    search, faults = leave_out_clips(search, faults, without)
     notify("judging the noise")
     search = search.light()
     search = with_outliers(search)
@@ -93,8 +92,7 @@ def run_procedure(
         search, base = without_shocks(search, used)
     search, tailed, in_noise = fit_heavy_tails(search, without)
     if tailed:  # whose outliers may have hidden them
-        search, more = leave_out_clips(search, without)
-        clips = together(clips, more)
+        search, faults = leave_out_clips(search, faults, without)
     notify("testing what is left")
     found, checks, named = ended(search, without, tailed)
     fewer = eliminate(found, [*in_noise, *shock, *named])
@@ -109,12 +107,12 @@ def run_procedure(
     notify("looking for what cannot be distinguished")
     classes = {cause.effect: rivals(search, cause) for cause in search.causes}
     return ProcedureResult(
-        search, base, scores, with_gains(search, raw, together(faults, clips)), in_noise, checks,
-        explained, failing, raw, whole, classes,
+        search, base, scores, with_gains(search, raw, faults), in_noise, checks, explained,
+        failing, raw, whole, classes,
     )  # fmt: skip
 
 
-def ended(search: Search, without, tailed) -> tuple[Search, list[Check], list[Fault]]:
+def ended(search: Search, without, tailed) -> tuple[Search, list[Check], list[Finding]]:
     """The search with the colour of its noise, the checks of what is left, causes in the noise."""
     search = fit_coloured_noise(search, without)
     checks = final_checks(search, tailed)
@@ -225,7 +223,7 @@ def fit_coloured_noise(search: Search, without) -> Search:
     return replace(search, readings=readings).ending(made, noise)
 
 
-def named_noise(search: Search, without, tailed, untied: bool) -> list[Fault]:
+def named_noise(search: Search, without, tailed, untied: bool) -> list[Finding]:
     """Scale and colour of the noise, where they depart from what is declared."""
     found, made, readings = [], beside_left(search)[0], search.readings
     for kind, name in enumerate(SCALES):

@@ -22,8 +22,8 @@ TURNS = [
 ]  # fmt: skip
 
 
-class Fault(NamedTuple):
-    """An effect of whole readings or of the noise: whose, log p, what it gains on held-out time."""
+class Finding(NamedTuple):
+    """A cause as it is reported: whose, log p, its numbers, what it gains on held-out time."""
 
     effect: str
     imus: tuple[int, ...]
@@ -34,7 +34,8 @@ class Fault(NamedTuple):
     blocks: np.ndarray | None = None  # nats of each held-out block
     says: str = ""  # of readings, what was read
     doubtful: bool = False  # named only where it gains
-    where: tuple = ()  # (first, last) s of stretches of time
+    rivals: tuple | list = ()  # effects that it cannot be told from
+    also: dict = {}  # what else its entry has
 
 
 def triads(values) -> np.ndarray:
@@ -62,7 +63,7 @@ def find_repeats(readings: Readings):
     says = f"{100 * np.mean(shares):.2g} % of the readings repeat the one before exactly"
     # a coarse converter at rest repeats itself, too, and is right
     imus = tuple(sorted({*imus}))
-    return [Fault("stale_samples", imus, min(logs), numbers, says=says, doubtful=True)], lost
+    return [Finding("stale_samples", imus, min(logs), numbers, says=says, doubtful=True)], lost
 
 
 def _as_read(readings: Readings, imu: int, kind: int) -> np.ndarray:
@@ -111,7 +112,7 @@ def _tied(readings: Readings, kind: int) -> float:
     return (1 + some.size - np.unique(some).size) / max(some.size, 1)
 
 
-def rails_cause(found, log_p: float, says: str) -> Fault:
+def rails_cause(found, log_p: float, says: str) -> Finding:
     """The cause of triads (imu, kind, rail in SI) whose readings a rail clips."""
     numbers = {}
     for kind, name in enumerate(KINDS):
@@ -120,7 +121,7 @@ def rails_cause(found, log_p: float, says: str) -> Fault:
             numbers[f"{name}_rail"] = float(np.median(sizes)), float(np.std(sizes)), UNITS[kind]
     where = ", ".join(f"{n} {v[0]:.4g} {v[2]}" for n, v in numbers.items())
     imus = tuple(sorted({imu for imu, *_ in found}))
-    return Fault(RAILS, imus, log_p, numbers, says=f"{says} ({where})")
+    return Finding(RAILS, imus, log_p, numbers, says=f"{says} ({where})")
 
 
 def _piles(size, at) -> bool:
@@ -174,7 +175,7 @@ def find_swaps(readings: Readings):
         turns[:] = np.eye(3)
         says = "no majority of the triads agrees on the axes: put them right first"
     imus = tuple(sorted({imu for imu, _ in hit}))
-    return [Fault(SWAP, imus, -1e6, {}, says=says)], turns, corrected
+    return [Finding(SWAP, imus, -1e6, {}, says=says)], turns, corrected
 
 
 def _nearest(reference, values) -> tuple[np.ndarray, np.ndarray]:

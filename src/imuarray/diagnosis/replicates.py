@@ -63,21 +63,22 @@ class Replicator:
         return left - fit.less_motion(moved)
 
 
-class Observed:
-    """Parts that the test quantities of one fit have in common, whatever the residual."""
+class Sensors:
+    """Parts that the test quantities of a kind's n triads have in common, whatever the residual."""
 
-    def __init__(self, fit: Fit):
-        self.keep = fit.readings.keep.astype(float)
-        known = observable(fit.readings, fit.basis)
-        self.known = np.repeat(known, 3, axis=1)  # (N, 6) bool, axes
-        self.labels = [[fit.readings.labels[k] for k in np.flatnonzero(own)] for own in known.T]
+    def __init__(self, fit: Fit, kind: int):
+        known = observable(fit.readings, fit.basis)[:, kind]
+        self.labels = [fit.readings.labels[k] for k in np.flatnonzero(known)]
+        self.there = (known[:, None] & (np.arange(6) // 3 == kind)).ravel()
+        keep = fit.readings.keep.astype(float)
+        together = (np.diff(fit.readings.run) == 0)[:, None, None]
+        # weights of readings, and of pairs of neighbours
+        self.keep, self.pairs = self.picked(keep), self.picked(together * keep[1:] * keep[:-1])
         time = fit.readings.time
         self.time, self.length = time - time.mean(), np.ptp(time)
         direction = fit.state.motion[:, 3:6]
         length = np.linalg.norm(direction, axis=1, keepdims=True)
         self.way = direction / np.where(length > 0, length, 1.0)
-        together = (np.diff(fit.readings.run) == 0)[:, None, None]
-        self.pairs = together * self.keep[1:] * self.keep[:-1]
         self.sizes = {}  # of the motion: weights of its highest quarter and lowest half, (2, T)
         for name, values in motion_sizes(fit).items():
             size = np.linalg.norm(values, axis=1)
@@ -85,38 +86,31 @@ class Observed:
                 low, high = np.quantile(size, [0.5, 0.75])
                 self.sizes[name] = np.stack([size > high, size < low]).astype(float)
 
+    def picked(self, values) -> np.ndarray:
+        """(T, n, 3) of values (T, N, 6)."""
+        return values.reshape(len(values), -1)[:, self.there].reshape(len(values), -1, 3)
+
+    def mean(self, values) -> np.ndarray:
+        """Mean by triad of values that are zero where readings are left out."""
+        return values.sum(axis=(0, 2)) / self.keep.sum(axis=(0, 2))
+
 
 class Part(NamedTuple):
     """A kind's residuals: ``values`` and their squares (T, n, 3), zero where left out."""
 
-    observed: Observed
-    there: np.ndarray  # (6 N,) bool, which readings
+    of: Sensors
     values: np.ndarray
     square: np.ndarray
 
-    def kept(self, of) -> np.ndarray:
-        """Weights (T, N, 6) of readings, as ``values``."""
-        return picked(of, self.there)
 
-    def mean(self, values) -> np.ndarray:
-        """Mean by triad of values that are zero where readings are left out."""
-        return values.sum(axis=(0, 2)) / self.kept(self.observed.keep).sum(axis=(0, 2))
-
-
-def picked(values, there) -> np.ndarray:
-    """(T, n, 3) of values (T, N, 6) at the readings that are ``there`` (6 N,) bool."""
-    return values.reshape(len(values), -1)[:, there].reshape(len(values), -1, 3)
-
-
-def quantities(unit, observed: Observed) -> dict[tuple[int, str], np.ndarray]:
+def quantities(unit, kinds: list[Sensors]) -> dict[tuple[int, str], np.ndarray]:
     """Values by sensor of each kind's `TESTS` of a residual (T, N, 6), NaN where left out."""
     filled, found = np.nan_to_num(unit), {}
-    for kind, labels in enumerate(observed.labels):
-        if not labels:
+    for kind, sensors in enumerate(kinds):
+        if not sensors.labels:
             continue
-        there = (observed.known & (np.arange(6) // 3 == kind)).ravel()
-        values = picked(filled, there)
-        part = Part(observed, there, values, values**2)
+        values = sensors.picked(filled)
+        part = Part(sensors, values, values**2)
         every = {(kind, check): test.function(part) for check, test in TESTS.items()}
         found |= {key: values for key, values in every.items() if values is not None}
     return found
@@ -135,12 +129,12 @@ def _growth(size):
     """rms in the highest quarter of a size of the motion over that in the lowest half, by triad."""
 
     def ratio(part):
-        chosen = part.observed.sizes.get(size)
+        chosen = part.of.sizes.get(size)
         if chosen is None:
             return None
         above, below = (
             (chosen @ values.reshape(len(values), -1)).reshape(2, -1, 3).sum(axis=2)
-            for values in (part.square, part.kept(part.observed.keep))
+            for values in (part.square, part.of.keep)
         )
         return np.sqrt(above[0] / below[0] / (above[1] / below[1]))
 
@@ -148,24 +142,22 @@ def _growth(size):
 
 
 def _rms(part):
-    return np.sqrt(part.square.sum(axis=0) / part.kept(part.observed.keep).sum(axis=0)).ravel()
+    return np.sqrt(part.square.sum(axis=0) / part.of.keep.sum(axis=0)).ravel()
 
 
 def _along(part):
-    along = np.einsum("tki,ti->tk", part.values, part.observed.way)
+    along = np.einsum("tki,ti->tk", part.values, part.of.way)
     return np.sum(along**2, axis=0) / np.maximum(np.sum(part.square, axis=(0, 2)), 1e-300)
 
 
 def _lag_one(part):
-    pairs = part.kept(part.observed.pairs)
-    products = np.sum(pairs * part.values[1:] * part.values[:-1], axis=(0, 2))
-    return products / pairs.sum(axis=(0, 2)) / part.mean(part.square)
+    products = np.sum(part.of.pairs * part.values[1:] * part.values[:-1], axis=(0, 2))
+    return products / part.of.pairs.sum(axis=(0, 2)) / part.of.mean(part.square)
 
 
 def _drift(part):
-    x = part.observed.time
-    slope = x @ part.values.reshape(len(x), -1) / np.sum(x**2)
-    return slope * part.observed.length
+    x = part.of.time
+    return x @ part.values.reshape(len(x), -1) / np.sum(x**2) * part.of.length
 
 
 def _between(part):
@@ -198,7 +190,7 @@ TESTS = {
     "whiteness": Test(_lag_one, "correlation in time", "the lag-one correlation of {}"),
     "drift": Test(_drift, "drift", "the drift of {} from start to end", by_axis=True),
     "kurtosis": Test(  # a fourth power by pow is slow
-        lambda part: part.mean(part.square * part.square) / part.mean(part.square) ** 2 - 3.0,
+        lambda part: part.of.mean(part.square * part.square) / part.of.mean(part.square) ** 2 - 3.0,
         "tails (kurtosis)",
         "the excess kurtosis of {}",
     ),
@@ -210,20 +202,20 @@ TESTS = {
 
 def discrepancies(fit: Fit, rng, replicates: int) -> list[Discrepancy]:
     """Every test quantity of a fit beside its band over replicates, most striking first."""
-    replicator, observed = Replicator(fit), Observed(fit)
+    replicator, kinds = Replicator(fit), [Sensors(fit, kind) for kind in range(len(KINDS))]
     share = fit.readings.keep / np.sqrt(np.maximum(1.0 - fit.leverage, 1e-6))
-    measured = quantities(standardised(fit), observed)
-    drawn = [quantities(replicator.draw(rng) * share, observed) for _ in range(replicates)]
+    measured = quantities(standardised(fit), kinds)
+    drawn = [quantities(replicator.draw(rng) * share, kinds) for _ in range(replicates)]
     found = [
-        _compare(observed, *key, values, np.array([each[key] for each in drawn]))
+        _compare(kinds[key[0]].labels, *key, values, np.array([each[key] for each in drawn]))
         for key, values in measured.items()
     ]
     return [item for _, item in sorted(found, key=lambda pair: pair[0], reverse=True)]
 
 
-def _compare(observed: Observed, kind: int, check: str, values, drawn):
+def _compare(labels, kind: int, check: str, values, drawn):
     """(how far out, Discrepancy) of the worst sensor, against the worst of each replicate."""
-    test, labels, name = TESTS[check], observed.labels[kind], KINDS[kind]
+    test, name = TESTS[check], KINDS[kind]
     places = [f"{k}{axis}" for k in labels for axis in "xyz"] if test.by_axis else labels
     centre, spread = drawn.mean(axis=0), np.maximum(drawn.std(axis=0), 1e-12)
     away = np.abs(values - centre) / spread

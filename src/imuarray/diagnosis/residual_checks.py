@@ -5,7 +5,7 @@ fitted parameters and the motion projected out; and the residual's size, its aut
 the correlation between sensors.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -19,6 +19,7 @@ from imuarray.engine.linearise import CHUNK
 from imuarray.engine.normal import projected_columns
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.linear import scaled_square
+from imuarray.model.structure import products
 from imuarray.motion.state import lever
 from imuarray.tails import log_chi_square, log_normal, log_poisson
 
@@ -31,6 +32,11 @@ class Check(NamedTuple):
     log_p: float
     imus: tuple[int, ...]
 
+    @classmethod
+    def of(cls, name: str, statistic, log_p, *imus) -> Self:
+        """With plain numbers; a multiplicity may take log p beyond 0."""
+        return cls(name, float(statistic), float(min(log_p, 0.0)), tuple(map(int, imus)))
+
 
 def features(fit: Fit, imu: int) -> dict[str, np.ndarray]:
     """Groups of features of an IMU's own motion, each (T, n) with unit mean square."""
@@ -39,15 +45,14 @@ def features(fit: Fit, imu: int) -> dict[str, np.ndarray]:
     force = lever(rate, turn, state.positions[min(imu, len(state.positions) - 1)]) + motion[:, 6:9]
     jerk, force_rate = state.jerk
     time = 2 * fit.readings.time[:, None] / fit.readings.span - 1
-    pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
     groups = {
         "offset": np.ones((len(rate), 1)),
         "force": force,
-        "force squared": np.stack([force[:, i] * force[:, j] for i, j in pairs], 1),
+        "force squared": products(force),
         "force cubed": force**3,
         "force's size": np.abs(force),
         "rate": rate,
-        "rate squared": np.stack([rate[:, i] * rate[:, j] for i, j in pairs], 1),
+        "rate squared": products(rate),
         "rate cubed": rate**3,
         "omega dot": turn,
         "omega dot squared": np.sum(turn**2, axis=1, keepdims=True),
@@ -150,23 +155,21 @@ def _pooled(name, found, alike) -> Check:
     total, freedom = sum(f[1] for f in found), max(sum(f[2] for f in found), 1)
     log_p = log_chi_square(max(total / alike, 1e-9), freedom / alike)  # Satterthwaite's
     worst = max(found, key=lambda f: f[1] - f[2])
-    return Check(name, total / freedom, log_p, (worst[0],))
+    return Check.of(name, total / freedom, log_p, worst[0])
 
 
 def _either(name, found, alike) -> Check:
     """All axes together, or the worst of them."""
     together, worst = _pooled(name, found, alike), _worst(name, found)
-    best = min(together, worst, key=lambda check: check.log_p)
-    return best._replace(log_p=min(best.log_p + np.log(2), 0.0))
+    _, statistic, log_p, imus = min(together, worst, key=lambda check: check.log_p)
+    return Check.of(name, statistic, log_p + np.log(2), *imus)
 
 
 def _worst(name, found) -> Check:
     """The worst axis, all of them allowed for."""
     tested = [(log_chi_square(max(f[1], 1e-9), max(f[2], 1)), f) for f in found]
     log_p, worst = min(tested, key=lambda t: t[0])
-    return Check(
-        name, worst[1] / max(worst[2], 1), min(log_p + np.log(len(found)), 0.0), (worst[0],)
-    )
+    return Check.of(name, worst[1] / max(worst[2], 1), log_p + np.log(len(found)), worst[0])
 
 
 def size_checks(fit: Fit) -> list[Check]:
@@ -185,60 +188,47 @@ def size_checks(fit: Fit) -> list[Check]:
             average = np.nanmean(square)
             excess = np.nan_to_num(square / average - 1).sum(axis=1)
             spread = np.sqrt(np.sum((trend * excess) ** 2))
-            found.append((int(imu), float((trend @ excess) / spread)))
+            found.append((imu, (trend @ excess) / spread))
         checks.append(normal_checks(f"residual's size against {name}", found))
     return checks
 
 
 def normal_checks(name, found, alike=False) -> Check:
     """Worst and pooled of standard normals expected near zero; their mean where all are alike."""
+    found = [(imu, float(z)) for imu, z in found]
     worst = max(found, key=lambda f: abs(f[1]))
     single = log_normal(abs(worst[1])) + np.log(2 * len(found))
     pooled = log_chi_square(sum(z**2 for _, z in found), len(found))
     mean = log_normal(abs(sum(z for _, z in found)) / np.sqrt(len(found))) + np.log(2)
     log_p = min(single, pooled, mean if alike else 0.0) + np.log(2 + alike)
-    return Check(name, worst[1], float(min(log_p, 0.0)), (worst[0],))
+    return Check.of(name, worst[1], log_p, worst[0])
 
 
 def age_checks(fit: Fit) -> list[Check]:
-    """Do IMUs' ages come and go at some frequency, or wander from sample to sample?"""
+    """Do IMUs' ages come and go at some frequency, or wander from sample to sample?
+
+    The periodogram of each IMU's delay; the residual along a delay where delays show most.
+    """
     score, information = delay_score(fit)
-    both = np.flatnonzero(fit.readings.exists.all(axis=1))
-    parts = [(int(imu), score[:, imu], information[:, imu]) for imu in both]
-    return [_turning_ages(fit.readings.time, parts), _wandering_ages(parts)]
-
-
-def _turning_ages(time, parts) -> Check:
-    """The periodogram of each IMU's delay, by (imu, its score, its information)."""
+    both, time = np.flatnonzero(fit.readings.exists.all(axis=1)), fit.readings.time
     place = np.round((time - time[0]) / np.median(np.diff(time))).astype(int)
-    found = []
-    for imu, own, known in parts:
+    turning, wandering = [], []
+    for imu, own, known in zip(both, score.T[both], information.T[both], strict=True):
         grid = np.zeros(place[-1] + 1)
         np.add.at(grid, place, own - known * own.sum() / known.sum())
         power = np.abs(np.fft.rfft(grid))[SETTINGS.slow :] ** 2
-        if len(power) < SETTINGS.around:
-            continue
-        # against white noise, or its own level around a frequency where that is higher
-        level = median_filter(power, SETTINGS.around, mode="nearest") / np.log(2)
-        highest = float(np.max(power / np.maximum(level, known.sum())))
-        found.append((imu, highest, np.log(len(power) * len(parts)) - highest))
-    if not found:
-        return Check("ages in time", 0.0, 0.0, ())
-    imu, highest, log_p = min(found, key=lambda f: f[2])
-    return Check("ages in time", highest, float(min(log_p, 0.0)), (imu,))
-
-
-def _wandering_ages(parts) -> Check:
-    """The residual along a delay where delays show most."""
-    found = []
-    for imu, own, known in parts:
+        if len(power) >= SETTINGS.around:
+            # against white noise, or its own level around a frequency where that is higher
+            level = median_filter(power, SETTINGS.around, mode="nearest") / np.log(2)
+            highest = np.max(power / np.maximum(level, known.sum()))
+            log_p = np.log(len(power) * len(both)) - highest
+            turning.append(Check.of("ages in time", highest, log_p, imu))
         square = own**2 / known
         excess = (known - known.mean()) * (square - square.mean())
-        spread = np.sqrt(np.sum(excess**2))
-        found.append((imu, float(excess.sum() / max(spread, 1e-300))))
-    if not found:
-        return Check("ages that wander", 0.0, 0.0, ())
-    return normal_checks("ages that wander", found, alike=True)
+        wandering.append((imu, excess.sum() / max(np.sqrt(np.sum(excess**2)), 1e-300)))
+    worst = sorted(turning, key=lambda check: -check.statistic)[:1]
+    wander = [normal_checks("ages that wander", wandering, alike=True)] if wandering else []
+    return worst + wander
 
 
 def correlation_check(fit: Fit, noise: Noise) -> Check:
@@ -257,10 +247,8 @@ def correlation_check(fit: Fit, noise: Noise) -> Check:
     values = z[np.ix_(there, there)][upper]
     place = int(np.argmax(np.abs(values)))
     log_p = log_normal(abs(values[place])) + np.log(2 * len(values))
-    imus = sorted({int(there[i[place]] // 6) for i in upper})
-    return Check(
-        "correlation between sensors", float(values[place]), float(min(log_p, 0.0)), tuple(imus)
-    )
+    imus = sorted({there[i[place]] // 6 for i in upper})
+    return Check.of("correlation between sensors", values[place], log_p, *imus)
 
 
 def noise_checks(noise: Noise, exists) -> list[Check]:
@@ -268,12 +256,9 @@ def noise_checks(noise: Noise, exists) -> list[Check]:
     triads = np.argwhere(exists)
     tails = log_poisson(noise.outliers, noise.expected)
     worst = min(triads, key=lambda t: tails[tuple(t)])
-    outliers = Check(
-        "outliers", float(noise.outliers[tuple(worst)]),
-        float(min(tails[tuple(worst)] + np.log(len(triads)), 0.0)), (int(worst[0]),),
-    )  # fmt: skip
-    found = [(int(i), float(noise.slope[i, k])) for i, k in triads]
-    return [outliers, normal_checks("whiteness", found)]
+    number, log_p = noise.outliers[tuple(worst)], tails[tuple(worst)] + np.log(len(triads))
+    found = [(i, noise.slope[i, k]) for i, k in triads]
+    return [Check.of("outliers", number, log_p, worst[0]), normal_checks("whiteness", found)]
 
 
 def resolution_check(fit: Fit) -> Check:
@@ -282,7 +267,7 @@ def resolution_check(fit: Fit) -> Check:
     steps = np.where(readings.exists, readings.resolution / readings.sd, 0.0).max(axis=1)
     imu = int(np.argmax(steps))
     coarse = steps[imu] > SETTINGS.coarse
-    return Check("resolution", float(steps[imu]), -50.0 if coarse else 0.0, (imu,))
+    return Check.of("resolution", steps[imu], -50.0 if coarse else 0.0, imu)
 
 
 def all_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]:

@@ -12,7 +12,7 @@ from scipy.ndimage import binary_propagation
 
 from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.noise_effects import held_out
-from imuarray.diagnosis.reading_effects import Fault
+from imuarray.diagnosis.reading_effects import Finding
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.tails import log_poisson
 
@@ -45,7 +45,7 @@ def misfits(fit: Fit) -> Misfit:
     return Misfit(whole / size, least / size, worst, freedom, rest)
 
 
-def find_shocks(fit: Fit, limit: float) -> tuple[Fault | None, np.ndarray]:
+def find_shocks(fit: Fit, limit: float) -> tuple[Finding | None, np.ndarray]:
     """The cause and its samples (T,) bool, none where it is not there.
 
     Samples where two IMUs or more are far off must be more than those of single IMUs make by
@@ -71,8 +71,9 @@ def find_shocks(fit: Fit, limit: float) -> tuple[Fault | None, np.ndarray]:
     numbers = _numbers(shaken, jerk)
     nats = np.where(shaken, (found.least - rest) / 2, 0.0)
     imus = tuple(range(fit.residual.shape[1]))
-    where = tuple(_stretches(fit.readings.time + fit.readings.origin, fit.readings.run, shaken))
-    return Fault(SHOCK, imus, log_p, numbers, *held_out(nats), where=where), shaken
+    where = _stretches(fit.readings.time + fit.readings.origin, fit.readings.run, shaken)
+    also = {"stretches_s": where}
+    return Finding(SHOCK, imus, log_p, numbers, *held_out(nats), also=also), shaken
 
 
 def with_neighbours(shaken, run, number: int) -> np.ndarray:
@@ -114,9 +115,9 @@ def _numbers(shaken, jerk) -> dict:
 
 
 def _stretches(time, run, shaken):
-    """(first, last) s of up to `SETTINGS.stated` shaken stretches, the longest first."""
+    """[first, last] s of up to `SETTINGS.stated` shaken stretches, the longest first."""
     index = np.flatnonzero(shaken)
     cut = np.flatnonzero((np.diff(index) > SETTINGS.apart) | (np.diff(run[index]) > 0)) + 1
     parts = [part for part in np.split(index, cut) if len(part)]
     longest = sorted(parts, key=len)[-SETTINGS.stated :]
-    return [(float(time[p[0]]), float(time[p[-1]])) for p in longest[::-1]]
+    return [[float(time[p[0]]), float(time[p[-1]])] for p in longest[::-1]]

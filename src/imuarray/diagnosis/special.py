@@ -149,19 +149,16 @@ def drift_check(search, cause) -> list[Check]:
     statistic, freedom = need(search, DRIFT, among=changing)
     steady = log_chi_square(statistic, max(freedom, 1)) > SETTINGS.limit(DRIFT)
     steady |= statistic < SETTINGS.changing * need(search, DRIFT)[0]
-    return [
-        Check(f"change of {DRIFT}", statistic, SETTINGS.steady_drift if steady else 0.0, cause.imus)
-    ]
+    log_p = SETTINGS.steady_drift if steady else 0.0
+    return [Check.of(f"change of {DRIFT}", statistic, log_p, *cause.imus)]
 
 
 SPECIAL = {
-    CLOCK: Special(
-        scan=sawtooth_scan, linear=False, maybe=maybe_clock, placebo=placebo_of_ages
-    ),
+    CLOCK: Special(scan=sawtooth_scan, linear=False, maybe=maybe_clock, placebo=placebo_of_ages),
     along_time.SHIFT: Special(scan=along_time.scan_shifts, refine=along_time.refine_instants),
     along_time.WARM_UP: Special(scan=along_time.scan_warming, maybe=along_time.maybe_warming),
     DRIFT: Special(maybe=maybe_drift, check=drift_check),
-}  # fmt: skip
+}
 
 
 def placebo_gain(search, cause) -> tuple[float, float]:

@@ -6,7 +6,7 @@ zero, and on held-out time.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property, partial
 from typing import Self
 
 import numpy as np
@@ -37,29 +37,21 @@ class Cause:
     tries: float = 0.0
 
 
-@dataclass(frozen=True)
-class ScoreAtFit:
-    """Score and information at a fit, made when asked for: not every fit is tested."""
+def weigh(made: Fit, correlation) -> Information:
+    """Score and information of all parameters that a fit has derivatives by.
 
-    fit: Fit
-    correlation: np.ndarray  # (N, 2) of the noise in time
-
-    @cached_property
-    def given(self) -> Information:
-        """Information of all parameters that the fit has derivatives by.
-
-        The score's covariance has what a correction left of maps and offsets, much of which all
-        sensors share.
-        """
-        made, plain = self.fit, information_at(self.fit)
-        meat = noises.coloured_meat(made, plain.information, self.correlation)
-        # fitted ones, too: put back to zero they are what the others are; refitted, nothing is left
-        mask = residual_map_mask([made.readings.left], made.columns, False) & made.described
-        if mask.any():
-            cross = plain.information[:, plain.places(mask)]
-            spread = spread_of(made.readings.left, made.columns, mask)
-            meat = (plain.information if meat is None else meat) + cross @ spread @ cross.T
-        return plain if meat is None else replace(plain, meat=meat, correlation=self.correlation)
+    ``correlation`` (N, 2) of the noise in time. The score's covariance has what a correction left
+    of maps and offsets, much of which all sensors share.
+    """
+    plain = information_at(made)
+    meat = noises.coloured_meat(made, plain.information, correlation)
+    # fitted ones, too: put back to zero they are what the others are; refitted, nothing is left
+    mask = residual_map_mask([made.readings.left], made.columns, False) & made.described
+    if mask.any():
+        cross = plain.information[:, plain.places(mask)]
+        spread = spread_of(made.readings.left, made.columns, mask)
+        meat = (plain.information if meat is None else meat) + cross @ spread @ cross.T
+    return plain if meat is None else replace(plain, meat=meat, correlation=correlation)
 
 
 @dataclass(frozen=True)
@@ -74,7 +66,7 @@ class Search:
     causes: tuple[Cause, ...] = ()  # what is adopted, in order
     fit: Fit | None = None  # of what is adopted
     noise: noises.Noise | None = None
-    weighed: ScoreAtFit | None = None
+    weighed: Callable[[], Information] | None = None  # at the fit, made once: not all are tested
     refused: frozenset[Candidate] = frozenset()  # what did not gain
     excess: float = 0.0  # of the misfit over its degrees of freedom, before any cause
     jumps: np.ndarray | bool = False  # (T, N, 6) bool, readings left out near a clock's jump
@@ -94,7 +86,7 @@ class Search:
     @property
     def given(self) -> Information:
         """Score and information at the present fit."""
-        return self.weighed.given
+        return self.weighed()
 
     def imus_with(self, effect: str) -> tuple[int, ...]:
         """IMUs for which an effect is adopted."""
@@ -180,7 +172,8 @@ class Search:
 
     def ending(self, made: Fit, noise: noises.Noise) -> Self:
         """With a fit, and the noise there."""
-        return replace(self, fit=made, noise=noise, weighed=ScoreAtFit(made, noise.correlation))
+        once = cache(partial(weigh, made, noise.correlation))
+        return replace(self, fit=made, noise=noise, weighed=once)
 
     def started(self, effect: str = "", values: dict | None = None) -> State:
         """The present state, dropped effects at zero, ``effect`` at a scan's {imu: ``values``}."""

@@ -90,11 +90,7 @@ class ArrayModel:
     @cached_property
     def effect_prior_sd(self) -> np.ndarray:
         """Prior sd of every effect parameter, (P,), in the effects' units."""
-        parts = [
-            np.broadcast_to(e.prior_sd, s).ravel()
-            for e, s in zip(self.chain, self.shapes, strict=True)
-        ]
-        return np.concatenate([np.empty(0), *parts])
+        return self.join({item.id: item.prior_sd for item in self.chain})
 
     @property
     def needs_derivatives(self) -> bool:
