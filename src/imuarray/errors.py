@@ -48,17 +48,19 @@ def require(holds: object, where: str, expected: str, found: object) -> None:
 
 
 @contextmanager
-def expecting(where: object, expected: str, errors=Exception) -> Iterator[None]:
+def expecting(where: object, expected: str, errors=Exception, most=None) -> Iterator[None]:
     """InputError, "where: expected ..., found ...", for ``errors`` that are raised within.
 
     By default for all, with their names: of a damaged file libraries raise nearly anything.
+    ``most``: characters of their first line alone, of those whose messages are pages.
     """
     try:
         yield
     except InputError:
         raise
     except errors as error:
-        found = f"{type(error).__name__}: {error}" if errors is Exception else str(error)
+        text = str(error) if most is None else str(error).strip().split("\n")[0][:most]
+        found = f"{type(error).__name__}: {text}" if errors is Exception else text
         raise InputError(f"{where}: expected {expected}, found {found}") from error
 
 

@@ -5,7 +5,6 @@ what cannot be told apart.
 """
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +13,6 @@ from imuarray.diagnosis.scores import (
     Candidate,
     Information,
     Score,
-    able,
     candidates,
     detectable,
     mask_of,
@@ -187,19 +185,13 @@ def _beside(cause: Cause, wider: Candidate) -> tuple[int, ...]:
     return tuple(k for k in cause.imus if k not in wider.imus)
 
 
-class Separability(NamedTuple):
-    """Squared canonical correlations between n effects, motion and positions projected out."""
+def separability(given: Information, fit: Fit, adopted=()) -> dict:
+    """{(effect, other): (largest, mean)} likeness on this recording, on all IMUs that can have it.
 
-    effects: tuple[str, ...]
-    largest: np.ndarray  # (n, n) of the two most alike forms; 1 is an exact gauge in one form
-    mean: np.ndarray  # (n, n) over the forms of the smaller effect; 1 where the other contains it
-
-
-def separability(given: Information, fit: Fit, adopted=()) -> Separability:
-    """Likeness of the effects on this recording, each on all IMUs that can have it.
-
-    ``adopted``: (effect, imus) pairs. Effects that only a scan sees (a clock, a step) have a
-    direction once they are adopted, on the IMUs that have them; else they are left out.
+    Squared canonical correlations, motion and positions projected out: of the two most alike forms,
+    1 for an exact gauge in one form; over the forms of the smaller effect, 1 where the other
+    contains it. ``adopted``: (effect, imus) pairs. Effects that only a scan sees (a clock, a step)
+    have a direction once they are adopted, on the IMUs that have them; else they are left out.
     """
     left = conditional(given, given.places(fit.columns.mask([POSITION])))
     imus = dict(adopted)
@@ -207,19 +199,14 @@ def separability(given: Information, fit: Fit, adopted=()) -> Separability:
     for effect in fit.columns.model.effects:
         if EFFECTS[effect].scanned and effect not in imus:
             continue
-        whose = imus[effect] if EFFECTS[effect].scanned else range(len(fit.columns.owner))
-        mask = mask_of(fit.columns, Candidate(effect, tuple(whose)))
-        chosen = given.places(mask & able(fit.readings.exists, effect)[:, None])
+        able = fit.readings.exists[:, EFFECTS[effect].kinds].any(axis=1)
+        mask = fit.columns.mask([effect], imus[effect] if EFFECTS[effect].scanned else None)
+        chosen = given.places(mask & able[:, None])
         basis = orthonormal(left, chosen, given.scale[chosen])
         if basis.shape[1]:
             bases[effect] = chosen, basis
     squares = {(a, b): squared_correlations(left, bases[a], bases[b]) for a in bases for b in bases}
-    shape = (len(bases), len(bases))
-    return Separability(
-        tuple(bases),
-        np.array([found.max() for found in squares.values()]).reshape(shape),
-        np.array([found.mean() for found in squares.values()]).reshape(shape),
-    )
+    return {pair: (found.max(), found.mean()) for pair, found in squares.items()}
 
 
 def conditional(given: Information, known) -> np.ndarray:

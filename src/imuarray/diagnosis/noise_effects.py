@@ -130,21 +130,15 @@ def alike(fit: Fit, noise: Noise, imu: int, kind: int) -> bool:
     return bool(abs(noise.slope[imu, kind] - implied) < SETTINGS.agree)
 
 
-def noise_scale(
-    fit: Fit, noise: Noise, kind: int, limit, least, skip=(), untied=True
-) -> Finding | None:
-    """The noise of a kind's triads against the declared one, but of IMUs to ``skip``, or None.
+def noise_scale(fit: Fit, noise: Noise, kind: int, limit, least, untied=True) -> Finding | None:
+    """The noise of a kind's triads against the declared one, or None.
 
     ``least`` (N,) log ratios below which a departure is not believed.
     """
     readings = fit.readings
     pairs = np.argwhere(observable(readings, fit.basis))
     log_ratio, covariance = scales(fit, noise, untied)
-    chosen = np.flatnonzero(
-        (pairs[:, 1] == kind)
-        & (np.abs(log_ratio) > np.asarray(least)[pairs[:, 0]])
-        & ~np.isin(pairs[:, 0], list(skip))
-    )
+    chosen = np.flatnonzero((pairs[:, 1] == kind) & (np.abs(log_ratio) > least[pairs[:, 0]]))
     if not len(chosen):
         return None
     tested = covariance[np.ix_(chosen, chosen)]
@@ -214,22 +208,22 @@ def heavy_tails(fit: Fit, noise: Noise, limit: float):
     least = min(logs.min(), *pooled.values())
     if least > limit:
         return None, [], []
-    hits = [item for item, log_p in zip(tried, logs, strict=True) if log_p < limit]
-    maybe = logs - np.log(len(triads)) < SETTINGS.maybe
+    hits, maybe = [*np.flatnonzero(logs < limit)], logs - np.log(len(triads)) < SETTINGS.maybe
     for kind, together in pooled.items():
-        rest = (triads[:, 1] == kind) & (logs >= limit)
-        if rest.sum() == sum(triads[:, 1] == kind):
+        mine = triads[:, 1] == kind
+        rest = mine & (logs >= limit)
+        if np.array_equal(rest, mine):
             alike = together < SETTINGS.others
         else:
             # less the largest, which the motion may have taken along from a hit
             alike = rest.sum() > 1 and _all_tails(np.sort(gains[rest])[:-1]) < SETTINGS.others
         if alike:
-            hits += [item for item, also in zip(tried, rest, strict=True) if also]
+            hits += [*np.flatnonzero(rest)]
         elif rest.any() and log_chi_square(max(gains[rest].sum(), 1e-9), 2 * rest.sum()) < limit:
-            hits += [item for item, also in zip(tried, rest & maybe, strict=True) if also]
+            hits += [*np.flatnonzero(rest & maybe)]
             maybe |= rest
-    there = {item[:2] for item in hits}
-    others = [m for m, may in zip(tried, maybe, strict=True) if may and m[:2] not in there]
+    others = np.setdiff1d(np.flatnonzero(maybe), hits)
+    hits, others = ([tried[place] for place in places] for places in (hits, others))
     imus = tuple(sorted({imu for imu, *_ in hits}))
     return Finding(TAILS, imus, float(least), *_numbers(fit, hits)), hits, others
 

@@ -228,15 +228,12 @@ def named_noise(search: Search, without, tailed, untied: bool) -> list[Finding]:
     found, made, readings = [], beside_left(search)[0], search.readings
     for kind, name in enumerate(SCALES):
         if name not in without:
+            limit, least = SETTINGS.limit(name), least_ratios(search)
             # the mixture's core is the noise of a triad with heavy tails
-            skip = [
-                imu for imu, k, mix in tailed
-                if k == kind and abs(np.log(mix.core * readings.sd[imu, k]
-                                            / readings.declared[imu, k])) < SETTINGS.tailed
-            ]  # fmt: skip
-            found.append(noise_effects.noise_scale(
-                made, search.noise, kind, SETTINGS.limit(name), least_ratios(search), skip, untied
-            ))  # fmt: skip
+            for imu, _, mix in (item for item in tailed if item[1] == kind):
+                core = mix.core * readings.sd[imu, kind] / readings.declared[imu, kind]
+                least[imu] = np.inf if abs(np.log(core)) < SETTINGS.tailed else least[imu]
+            found.append(noise_effects.noise_scale(made, search.noise, kind, limit, least, untied))
     if COLOURED not in without:
         limit = SETTINGS.limit(COLOURED)
         found.append(noise_effects.coloured(made, search.noise, limit, untied))

@@ -127,6 +127,7 @@ class Courses:
         self.score = np.array([part[1][own] for part in parts]) + self.whole @ values
         self.moved = values @ self.cross.sum(axis=0)
         self.time = np.array([fit.readings.time[block].mean() for block in blocks])
+        self.steady = np.ones_like(self.time)  # the course of a constant
         self.span = fit.readings.span
         # the catalogue's: a diagnosis without the effect asks, too, whether biases grew
         sds = np.reshape(EFFECTS[WARM_UP].prior_sd[:6], (2, 3))
@@ -151,10 +152,9 @@ class Courses:
     def best_zero(self, pace: float) -> tuple[float, float]:
         """(chi-square, zero) of the courses of a pace."""
         found = minimize_scalar(
-            lambda zero: -self.gain(self.course(pace, zero))[0],
-            bounds=SETTINGS.zeros,
+            lambda zero: -self.gain(self.course(pace, zero))[0], bounds=SETTINGS.zeros,
             method="bounded",
-        )
+        )  # fmt: skip
         return -found.fun, found.x
 
     def best(self) -> tuple[float, float]:
@@ -180,7 +180,7 @@ def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
         return []
     courses = Courses(fit, given, imus)
     pace, zero = courses.best()
-    course, steady = courses.course(pace, zero), np.ones_like(courses.time)
+    course, steady = courses.course(pace, zero), courses.steady
     gain, values = courses.gain(course)
     if gain - courses.gain(steady)[0] < -2 * SETTINGS.effect:
         return []
@@ -198,8 +198,7 @@ def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
         return []
     freedom = len(values) + 2
     log_p = min(log_chi_square(gain, freedom) + np.log(2 * len(SETTINGS.paces)), 0.0)
-    each = values.reshape(len(imus), 6)
-    shape = [pace / courses.span, zero]
+    each, shape = values.reshape(len(imus), 6), [pace / courses.span, zero]
     starts = {imu: np.append(own, shape) for imu, own in zip(imus, each, strict=True)}
     score = Score(Candidate(WARM_UP, tuple(imus), "", True), gain, freedom, log_p)
     return [Scanned(score, starts)]
@@ -212,7 +211,7 @@ def maybe_grown(search, cause) -> bool:
     own = courses.kind == KINDS.index(EFFECTS[cause.effect].sensors)
     paces = [pace for pace in SETTINGS.paces if abs(pace) <= SETTINGS.settled_pace]
     grown = max(courses.gain(courses.course(pace, 0.0), own)[0] for pace in paces)
-    return bool(grown > courses.gain(np.ones_like(courses.time), own)[0] - 2 * SETTINGS.rival)
+    return bool(grown > courses.gain(courses.steady, own)[0] - 2 * SETTINGS.rival)
 
 
 def maybe_warming(search, cause, own: float) -> bool:
@@ -221,8 +220,5 @@ def maybe_warming(search, cause, own: float) -> bool:
     if len(search.imus_with(cause.effect)) < len(imus):
         return False
     courses = Courses(search.fit, search.given, imus, back=True)
-    gain, steady = (
-        courses.gain(course)[0]
-        for course in (courses.course(*courses.best()), np.ones_like(courses.time))
-    )
-    return bool(gain > steady - 2 * SETTINGS.rival)
+    gain = courses.gain(courses.course(*courses.best()))[0]
+    return bool(gain > courses.gain(courses.steady)[0] - 2 * SETTINGS.rival)

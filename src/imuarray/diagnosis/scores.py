@@ -16,7 +16,7 @@ from imuarray.engine.heldout import blocks_of
 from imuarray.engine.parameters import Columns
 from imuarray.linear import scaled_eigh, scaled_inverse
 from imuarray.model.array_model import component, unit_of
-from imuarray.model.effects import EFFECTS, KINDS
+from imuarray.model.effects import EFFECTS
 from imuarray.tails import log_chi_square
 
 POWER = special.ndtri(SETTINGS.power)  # in deviates
@@ -88,19 +88,14 @@ def mask_of(columns: Columns, candidate: Candidate) -> np.ndarray:
     return out & columns.owner
 
 
-def able(exists, effect: str) -> np.ndarray:
-    """(N,) bool: IMUs that have a sensor which the effect changes."""
-    kind = EFFECTS[effect].sensors
-    return exists.any(axis=1) if kind == "imu" else exists[:, KINDS.index(kind)]
-
-
 def candidates(columns: Columns, exists, effects) -> list[Candidate]:
     """Every effect that a score can see, on all IMUs and on each."""
     found = []
     for effect in effects:
         if EFFECTS[effect].scanned:
             continue
-        imus = tuple(int(k) for k in np.flatnonzero(able(exists, effect)))
+        able = exists[:, EFFECTS[effect].kinds].any(axis=1)
+        imus = tuple(int(k) for k in np.flatnonzero(able))
         for variant in variants(effect):
             found.append(Candidate(effect, imus, variant, True))
             found += [Candidate(effect, (k,), variant) for k in imus if len(imus) > 1]

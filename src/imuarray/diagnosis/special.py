@@ -95,9 +95,8 @@ def placebo_of_ages(search) -> tuple[float, float]:
         return own - np.einsum("tkd,td->tk", projected, common)
 
     imus = list(search.clocks)
-    own, moved = np.zeros_like(delay), np.zeros_like(delay)
-    own[:, imus] = delay[:, imus]
-    moved[:, imus] = np.roll(delay[:, imus], 1, axis=1)
+    own, moved = np.zeros((2, *delay.shape))
+    own[:, imus], moved[:, imus] = delay[:, imus], np.roll(delay[:, imus], 1, axis=1)
     bare = score + informed(own)
 
     def nats(values):
@@ -123,8 +122,7 @@ def scans(search, scores) -> list[Scanned]:
     for effect, special in SPECIAL.items():
         if special.scan is None or effect not in search.effects:
             continue
-        whole = EFFECTS[effect].sensors == "imu"
-        able = exists.all(axis=1) if whole else exists[:, 0]
+        able = exists[:, EFFECTS[effect].kinds].all(axis=1)
         imus = [int(k) for k in np.flatnonzero(able) if k not in search.imus_with(effect)]
         found += special.scan(search.fit, search.given, imus, scores) if imus else []
     return found

@@ -197,12 +197,9 @@ class Search:
 
 
 def freed_mask(search: Search, effect: str, imus=None, among=None) -> np.ndarray:
-    """An adopted effect's free parameters (N, m) bool, of some IMUs or ``among`` columns."""
-    chosen = search.columns.of(effect) if among is None else among
-    mask = search.active & np.isin(np.arange(search.columns.size), chosen)
-    if imus is not None:
-        mask[np.setdiff1d(np.arange(len(mask)), imus)] = False
-    return mask
+    """An adopted effect's free parameters (N, m) bool, of some IMUs or ``among`` its columns."""
+    mask = search.active & search.columns.mask([effect], imus)
+    return mask if among is None else mask & np.isin(np.arange(search.columns.size), among)
 
 
 def need(search: Search, effect: str, imus=None, among=None) -> tuple[float, int]:
@@ -224,7 +221,7 @@ def heldout_gain(
     ``parts``: the blocks' equations, if known; of some ``imus``, beside what is ``there`` (N, m).
     """
     columns, mask = search.columns, search.active
-    freed = columns.mask([effect], imus) & mask & ~np.asarray(there)
+    freed = freed_mask(search, effect, imus) & ~np.asarray(there)
     values = columns.flat(search.fit.state)[mask]
     parts = normal_blocks(search.fit, mask) if parts is None else parts
     rest, alone = ~freed[mask], np.zeros((len(values), len(values)))

@@ -1,16 +1,16 @@
 """A test that an effect is what it declares: made once, before anything rests on it."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 
-from imuarray.errors import InputError, require
+from imuarray.errors import InputError, expecting, require
 from imuarray.model.effects import Effect, Instant, Prediction
 from imuarray.model.jax64 import jax, jnp
 from imuarray.motion.state import Motion
 
 ACCELEROMETERS, GYROSCOPES = 7, 5  # of the array that effects are tried on
+running = partial(expecting, most=120)  # somebody else's function: JAX's errors are long
 
 
 def probe(item: Effect) -> bool:
@@ -44,7 +44,7 @@ def _probe(item: Effect, sd, rng, where: str) -> bool:
     axes = np.tile(np.eye(3), (ACCELEROMETERS, 1, 1))
     _require_gauge(item, sd.shape, axes, where)
     function = f"a function of (parameters {sd.shape}, instant, predicted) in jax.numpy"
-    with _running(where, function):
+    with running(where, function):
         nothing = predicted(np.zeros(sd.shape), later)
     right, found = isinstance(nothing, Prediction), type(nothing).__name__
     require(right, where, "predicted._replace(...) returned", found)
@@ -56,7 +56,7 @@ def _probe(item: Effect, sd, rng, where: str) -> bool:
         same = np.allclose(old, new, rtol=1e-9, atol=1e-12)
         require(same, where, f"{kind} left as it is by parameters of zero", "it changed")
     drawn = sd * rng.standard_normal(sd.shape)
-    with _running(where, function):
+    with running(where, function):
         # as it is used: compiled, where numpy's functions and a Python `if` on values fail
         jax.eval_shape(lambda x: predicted(x, later), drawn)
         values, change = jax.jvp(lambda x: predicted(drawn, x), (later,), (later,))
@@ -67,7 +67,7 @@ def _probe(item: Effect, sd, rng, where: str) -> bool:
         by = jax.jacfwd(lambda x, y, r: predicted(x, later, y, r, time), argnums=(0, 1, 2))
         return by(jnp.asarray(drawn), plain, positions)
 
-    with _running(where, function):
+    with running(where, function):
         early, late = slopes(0.3), slopes(0.8)
     own = [_require_own(each, where) for each in (early, late)]
     declared = item.derivatives or not any(np.any(np.asarray(part) != 0) for part in change)
@@ -76,19 +76,8 @@ def _probe(item: Effect, sd, rng, where: str) -> bool:
     return all(own)
 
 
-@contextmanager
-def _running(where: str, expected: str) -> Iterator[None]:
-    """InputError, with a one-line account, for whatever somebody else's function raises within."""
-    try:
-        yield
-    except Exception as error:
-        text = str(error).strip().split("\n")[0]
-        found = f"{type(error).__name__}: {text[:120]}"
-        raise InputError(f"{where}: expected {expected}, found {found}") from error
-
-
 def _shape(item: Effect, where: str) -> tuple[int, ...]:
-    with _running(where, "shape=lambda a, g: a tuple"):
+    with running(where, "shape=lambda a, g: a tuple"):
         shape = tuple(int(size) for size in item.shape(ACCELEROMETERS, GYROSCOPES))
     expected = (
         f"a shape whose first axis counts triads, {ACCELEROMETERS} or {GYROSCOPES} for"
@@ -119,7 +108,7 @@ def _prior_sd(item: Effect, shape, where: str) -> np.ndarray:
 
 def _require_gauge(item: Effect, shape, axes, where: str) -> None:
     expected = f"gauge(shape, axes) to return arrays of shape {shape}"
-    with _running(where, expected):
+    with running(where, expected):
         shapes = {np.shape(own) for own in item.gauge(shape, axes)} if item.gauge else set()
     wrong = shapes - {shape}
     require(not wrong, where, expected, next(iter(wrong), None))

@@ -174,9 +174,8 @@ def separability_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """One row for each pair of effects: the largest and the mean squared canonical correlation."""
     search = diagnosis.found.search
     found = separability(search.given, search.fit, [(c.effect, c.imus) for c in search.causes])
-    pairs = pd.MultiIndex.from_product([found.effects] * 2, names=["effect", "other"])
-    columns = {"largest": found.largest.ravel(), "mean": found.mean.ravel()}
-    return pd.DataFrame(columns, pairs).reset_index()
+    rows = [(*pair, *alike) for pair, alike in found.items()]
+    return pd.DataFrame(rows, columns=["effect", "other", "largest", "mean"])
 
 
 def score_table(diagnosis: Diagnosis) -> pd.DataFrame:
