@@ -32,7 +32,7 @@ def one(seed: int) -> dict:
     row = {"seed": seed, "named": " ".join(named), "unexplained": found.unexplained}
     if not found.search.causes:
         tests: dict[str, float] = {}
-        for score, _ in proposals(found.search):
+        for score in proposals(found.search):
             effect = score.candidate.effect
             tests[effect] = min(tests.get(effect, 0.0), float(score.log_p))
         row |= {f"test {name}": value for name, value in tests.items()}

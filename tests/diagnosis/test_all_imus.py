@@ -91,15 +91,15 @@ def test_steps_that_a_correction_has_mixed_repeat_by_chance():
 def test_triads_that_move_at_one_instant():
     search, truth = searched("position_shift", sigma=8.0)
     (*single, whole) = scan_shifts(search.fit, search.given, list(EVERY))
-    assert whole.score.candidate.whole and whole.score.candidate.imus == EVERY
-    assert whole.score.log_p < min(LIMIT, *(one.score.log_p for one in single))
+    assert whole.candidate.whole and whole.candidate.imus == EVERY
+    assert whole.log_p < min(LIMIT, *(one.log_p for one in single))
     instant = truth["effects"][0]["parameters"]["instant"]["value"]
     assert whole.values[3][3] == pytest.approx(instant, abs=2 * 6.0 / SETTINGS.cuts)
 
 
 def test_a_position_shift_of_none(clean):
     found = scan_shifts(clean.fit, clean.given, list(EVERY))
-    assert all(one.score.log_p > -4.0 for one in found)
+    assert all(one.log_p > -4.0 for one in found)
 
 
 def test_tails_of_all_accelerometers(clean):
@@ -136,7 +136,7 @@ def test_one_that_drifts_is_no_warm_up():
     assert scan_warming(search.fit, search.given, list(EVERY)) == []
     search, _ = searched("warm_up", EVERY, 60.0)
     (found,) = scan_warming(search.fit, search.given, list(EVERY))
-    assert found.score.candidate.imus == EVERY
+    assert found.candidate.imus == EVERY
 
 
 def test_small_biases_of_all_may_be_a_warm_up():

@@ -334,7 +334,7 @@ def test_a_clock_in_coloured_noise_must_show_more():
     assert wider(search.fit, given, 0, clock) == pytest.approx(density, rel=1e-4) and density > 3
     assert wider(search.fit, white, 0, clock) == 1.0
     best = [
-        min(found.score.log_p for found in sawtooth_scan(search.fit, one, range(8), ()))
+        min(found.log_p for found in sawtooth_scan(search.fit, one, range(8), ()))
         for one in (given, white)
     ]
     assert best[0] > best[1] + 50
@@ -387,12 +387,10 @@ def test_all_are_not_named_for_what_one_has(alone, least, chosen):
     every = Score(Candidate("bias_drift", (0, 1, 2), "gyroscope linear", True), 1240.0, 18, -532.0)
     part = Score(Candidate("gyroscope_bias", (2,)), 1100.0, 3, -520.0)
     single = Score(Candidate("bias_drift", (2,), "gyroscope linear"), float(alone), 6, -500.0)
-    proposed = [(every, None), (part, None), (single, None)]
+    proposed = [every, part, single]
     search = SimpleNamespace(smooth=least is not None, least=least)
-    assert (
-        narrowest(proposed, search)[0] is {"every": every, "part": part, "single": single}[chosen]
-    )
-    assert narrowest(proposed[1:], search)[0] is part
+    assert narrowest(proposed, search) is {"every": every, "part": part, "single": single}[chosen]
+    assert narrowest(proposed[1:], search) is part
 
 
 def test_another_imu_is_judged_by_what_it_adds(scaled):

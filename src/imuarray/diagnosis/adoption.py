@@ -45,13 +45,12 @@ def tried(search: Search) -> list[Candidate]:
     ]  # fmt: skip
 
 
-def proposals(search: Search):
-    """[(score, start values by IMU or None)] of all tests and scans, most significant first."""
+def proposals(search: Search) -> list[Score]:
+    """All tests and scans, most significant first."""
     scores = score_all(search.given, search.fit, tried(search))
-    found = [(score, None) for score in scores]
-    found += scans(search, scores)
-    named = [(s, v) for s, v in found if s.candidate not in search.refused]
-    return sorted(named, key=lambda pair: log_odds(search, pair[0]))
+    every = [*scores, *scans(search, scores)]
+    named = [score for score in every if score.candidate not in search.refused]
+    return sorted(named, key=lambda score: log_odds(search, score))
 
 
 def log_odds(search: Search, score) -> float:
@@ -69,26 +68,26 @@ def adopt(search: Search, proposed=None) -> Search:
     vain: list[str] = []  # effects refused since the last was adopted
     while len(search.causes) < SETTINGS.most_causes and len(vain) < SETTINGS.patience:
         proposed = proposals(search) if proposed is None else proposed
-        proposed = [p for p in proposed if vain.count(p[0].candidate.effect) < SETTINGS.of_one]
-        best, values = narrowest(proposed, search) if proposed else (None, None)
+        proposed = [p for p in proposed if vain.count(p.candidate.effect) < SETTINGS.of_one]
+        best = narrowest(proposed, search) if proposed else None
         if best is None or not likely(search, best) or best.statistic < search.least:
             break
-        found = attempt(search, best, values)
+        found = attempt(search, best)
         # refused, it leaves all others' tests as they are
         adopted = len(found.trace) > len(search.trace)
         vain = [] if adopted else [*vain, best.candidate.effect]
-        proposed = None if adopted else [p for p in proposed if p[0] is not best]
+        proposed = None if adopted else [p for p in proposed if p is not best]
         search = found
     return replace(search, detectable=detectable(search))
 
 
-def narrowest(proposed, search: Search):
+def narrowest(proposed, search: Search) -> Score:
     """The first of the `proposals`, or a narrower one that has most of its test.
 
     One IMU's of an effect of all, if what the others have beyond it is too little for a cause. In
     rough motion, which leaves something for all that has parameters, parts of an effect as well.
     """
-    first, own = proposed[0][0], proposed[0][0].candidate
+    first, own = proposed[0], proposed[0].candidate
     parts = parts_of(own.effect)
     rest = (1 - SETTINGS.most) * first.statistic
     if search.smooth:
@@ -101,8 +100,7 @@ def narrowest(proposed, search: Search):
         less = score.freedom < first.freedom and first.statistic - score.statistic < rest
         return inside and less
 
-    found = [proposal for proposal in proposed[1:] if narrower(proposal[0])]
-    return min(found, key=lambda proposal: proposal[0].freedom, default=proposed[0])
+    return min(filter(narrower, proposed[1:]), key=lambda score: score.freedom, default=first)
 
 
 def likely(search: Search, score) -> bool:
@@ -112,7 +110,7 @@ def likely(search: Search, score) -> bool:
     return log_odds(search, score) <= SETTINGS.limit(effect, beside)
 
 
-def attempt(search: Search, score, values) -> Search:
+def attempt(search: Search, score: Score) -> Search:
     """Adopt a candidate and refit; where held-out time does not gain, refuse it."""
     candidate = score.candidate
     effect, special = candidate.effect, SPECIAL.get(candidate.effect)
@@ -120,9 +118,9 @@ def attempt(search: Search, score, values) -> Search:
     if special and not special.linear:
         gain, error = np.inf, 0.0
     else:
-        gain, error = predicted_gain(found, candidate, values, search.active)
+        gain, error = predicted_gain(found, score, search.active)
     if keeps(search, score, gain, error):
-        found = found.refit(found.started(effect, values))
+        found = found.refit(found.started(effect, score.values))
         if special and special.refine:
             found = special.refine(found, candidate.imus)
         found = prune(found, effect)
@@ -145,17 +143,16 @@ def keeps(search: Search, score, gain: float, error: float) -> bool:
     return gain > search.least_z * error and gain > SETTINGS.kept * predicted
 
 
-def predicted_gain(search: Search, candidate: Candidate, values, there) -> tuple[float, float]:
+def predicted_gain(search: Search, score: Score, there) -> tuple[float, float]:
     """The held-out gain, beside what is ``there`` (N, m), that one linearisation predicts."""
-    state, made = search.started(candidate.effect, values), search.fit
+    effect = score.candidate.effect
+    state, made = search.started(effect, score.values), search.fit
     if not np.array_equal(state.parameters, made.state.parameters):
         made = at(search.readings, search.columns, search.active, state, all_columns=False)
     made = replace(made, active=search.active)
     parts = normal_blocks(made, made.active)
     columns = likely_sizes(made, [sum(part) for part in zip(*parts, strict=True)])
-    return heldout_gain(
-        replace(search, fit=made, columns=columns), candidate.effect, parts, there=there
-    )
+    return heldout_gain(replace(search, fit=made, columns=columns), effect, parts, there=there)
 
 
 def merged(causes, score: Score) -> tuple[Cause, ...]:

@@ -17,6 +17,16 @@ TAILS, COLOURED = "heavy_tails", "coloured_noise"
 SCALES = tuple(f"{kind}_noise" for kind in KINDS)
 
 
+class Colours(NamedTuple):
+    """Autocorrelation of the n triads that show their noise."""
+
+    triads: np.ndarray  # (n, 2) IMU, kind
+    rho: np.ndarray  # (n,) of neighbouring samples
+    pairs: np.ndarray  # (n,) of them
+    slope: np.ndarray  # (n,) of the spectrum, as `Noise` has it
+    implied: np.ndarray  # (n,) of an AR(1) with this autocorrelation
+
+
 class Mixture(NamedTuple):
     """Two zero-mean normals for a triad's residual: a share is ``factor`` times as large."""
 
@@ -62,6 +72,14 @@ def autocorrelation(fit: Fit, imu: int, kind: int) -> tuple[float, int]:
     together = (np.diff(fit.readings.run) == 0)[:, None]
     pairs = np.where(together, unit[1:] * unit[:-1], np.nan)
     return float(np.nanmean(pairs) / np.nanmean(unit**2)), int(np.isfinite(pairs).sum())
+
+
+def colours(fit: Fit, noise: Noise) -> Colours:
+    """Colours of a fit's residual."""
+    known = observable(fit.readings, fit.basis)
+    rho, pairs = np.array([autocorrelation(fit, *pair) for pair in np.argwhere(known)]).T
+    implied = np.array([expected_ratio(value, len(fit.residual)) for value in rho])
+    return Colours(np.argwhere(known), rho, pairs, noise.slope[known], implied)
 
 
 def whole_scales(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
@@ -118,16 +136,11 @@ def scales(fit: Fit, noise: Noise, untied: bool) -> tuple[np.ndarray, np.ndarray
     apart = np.sqrt(np.maximum(rough - spread, spread))
     agree = (noise.correlation[there] != 0) | (np.abs(whole - fast) < SETTINGS.agree * apart)
     if untied:
-        agree |= np.array([alike(fit, noise, int(i), int(k)) for i, k in np.argwhere(there)])
+        own = colours(fit, noise)
+        agree |= np.abs(own.slope - own.implied) < SETTINGS.agree
     own = np.diag(np.where(agree, spread, rough))
     covariance = np.where(np.outer(agree, agree), covariance, own)
     return np.where(agree, whole, fast), covariance
-
-
-def alike(fit: Fit, noise: Noise, imu: int, kind: int) -> bool:
-    """True where a triad's spectrum has the slope that its lag-one correlation implies."""
-    implied = expected_ratio(autocorrelation(fit, imu, kind)[0], len(fit.residual))
-    return bool(abs(noise.slope[imu, kind] - implied) < SETTINGS.agree)
 
 
 def noise_scale(fit: Fit, noise: Noise, kind: int, limit, least, untied=True) -> Finding | None:
@@ -253,21 +266,18 @@ def _tail_gain(fit: Fit, noise: Noise, imu: int, kind: int, mix: Mixture) -> flo
     return 2 * float(mix.nats.sum()) * (1 - rho**2) / (1 + rho**2) if several else 0.0
 
 
-def pooled_autocorrelation(fit: Fit, noise: Noise, lagged) -> float:
-    """log p of lag-one correlations (n, 2: value, pairs) together, 0 where spectra disagree."""
-    known = observable(fit.readings, fit.basis)
-    kind = np.argwhere(known)[:, 1]
-    implied = np.array([expected_ratio(value, len(fit.residual)) for value, _ in lagged])
-    found = [0.0]
+def pooled_autocorrelation(found: Colours) -> float:
+    """log p of lag-one correlations together, 0 where spectra disagree."""
+    kind, logs = found.triads[:, 1], [0.0]
     for chosen in (np.ones(len(kind), bool), kind == 0, kind == 1):
         if chosen.any():
-            (rho, pairs), slopes = np.asarray(lagged)[chosen].T, noise.slope[known][chosen]
+            rho, pairs, slope, implied = (part[chosen] for part in found[1:])
             signed, root = np.sign(rho), np.sqrt(len(rho))
-            apart = abs(np.sum(signed * (slopes - implied[chosen]))) / root
-            there = -np.sum(signed * slopes) / root
+            apart = abs(np.sum(signed * (slope - implied))) / root
+            there = -np.sum(signed * slope) / root
             if apart < SETTINGS.agree < there:
-                found.append(log_chi_square(float(np.sum(rho**2 * pairs)), len(rho)) + np.log(3))
-    return min(found)
+                logs.append(log_chi_square(float(np.sum(rho**2 * pairs)), len(rho)) + np.log(3))
+    return min(logs)
 
 
 def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Finding | None:
@@ -275,38 +285,31 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Finding | No
 
     ``untied``: no check ties the residual to the motion; else only the spectrum above it counts.
     """
-    readings, triads = fit.readings, np.argwhere(observable(fit.readings, fit.basis))
-    number = len(triads)
-    nats, numbers, logs = np.zeros(len(fit.residual)), {}, []
-    step = float(np.median(np.diff(readings.time)))
-    lagged = np.array([autocorrelation(fit, *pair) for pair in triads])
+    own = colours(fit, noise)
+    triads, size, off = own.triads, np.abs(own.rho), np.abs(own.slope - own.implied)
     # the common motion passes a little of one triad's autocorrelation on to the others
-    passed = max(SETTINGS.flat, np.abs(lagged[:, 0]).max() / 5)
-    far = np.zeros(len(triads), bool)
-    for place, ((imu, kind), (rho, pairs)) in enumerate(zip(triads, lagged, strict=True)):
-        slope = noise.slope[imu, kind]
-        sharp = log_normal(abs(slope)) + np.log(2 * number)
-        plain = log_normal(abs(rho) * np.sqrt(pairs)) + np.log(2 * number)
-        log_p = min(sharp, plain if untied and alike(fit, noise, imu, kind) else 0.0)
-        marked = noise.correlation[imu, kind] != 0
-        implied = expected_ratio(rho, len(fit.residual))
-        agree = abs(slope - implied) < max(SETTINGS.agree, SETTINGS.agree_share * abs(implied))
-        far[place] = (log_p <= limit or marked) and (sharp <= limit or abs(rho) >= passed) and agree
-        if far[place]:
-            logs.append(float(log_p))
-    together = pooled_autocorrelation(fit, noise, lagged)
+    passed = max(SETTINGS.flat, size.max() / 5)
+    sharp = log_normal(np.abs(own.slope)) + np.log(2 * len(triads))
+    plain = log_normal(size * np.sqrt(own.pairs)) + np.log(2 * len(triads))
+    log_p = np.minimum(sharp, np.where(untied & (off < SETTINGS.agree), plain, 0.0))
+    marked = noise.correlation[tuple(triads.T)] != 0
+    agree = off < np.maximum(SETTINGS.agree, SETTINGS.agree_share * np.abs(own.implied))
+    far = ((log_p <= limit) | marked) & ((sharp <= limit) | (size >= passed)) & agree
+    logs = log_p[far]
+    together = pooled_autocorrelation(own)
     if not far.any() and together > limit:
         return None
     for kind in set(triads[far, 1]) or range(len(KINDS)):
         rest = (triads[:, 1] == kind) & ~far
-        own = lagged[rest]
-        pooled = log_chi_square(float(np.sum(own[:, 0] ** 2 * own[:, 1])), max(len(own), 1))
-        if len(own) and pooled < SETTINGS.others and np.median(np.abs(own[:, 0])) > passed:
+        square = float(np.sum(own.rho[rest] ** 2 * own.pairs[rest]))
+        pooled = log_chi_square(square, max(rest.sum(), 1))
+        if rest.any() and pooled < SETTINGS.others and np.median(size[rest]) > passed:
             far |= rest
     if not far.any():
         return None
-    for (imu, kind), (rho, pairs) in zip(triads[far], lagged[far], strict=True):
-        name = f"{KINDS[kind]}_{readings.labels[imu]}"
+    nats, numbers, step = np.zeros(len(fit.residual)), {}, np.median(np.diff(fit.readings.time))
+    for (imu, kind), rho, pairs in zip(triads[far], own.rho[far], own.pairs[far], strict=True):
+        name = f"{KINDS[kind]}_{fit.readings.labels[imu]}"
         error = float(np.sqrt((1 - rho**2) / pairs))
         numbers[f"correlation_{name}"] = (float(rho), error, "1")
         if rho > 0:
@@ -318,5 +321,5 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Finding | No
         jump = (unit[1:] - rho * unit[:-1]) ** 2 / (1 - rho**2)
         nats[1:] += np.sum(unit[1:] ** 2 - jump - np.log1p(-(rho**2)), axis=1) / 2
     imus = tuple(sorted({int(imu) for imu in triads[far, 0]}))
-    best = min(*logs, together, 0.0)
+    best = float(min(*logs, together, 0.0))
     return Finding(COLOURED, imus, best, numbers, *held_out(nats))

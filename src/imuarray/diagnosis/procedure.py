@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.adoption import adopt, proposals, rivals
 from imuarray.diagnosis.final_checks import (
@@ -69,15 +68,14 @@ def run_procedure(
     columns = columns_of(readings.array, described, readings.position_prior_sd)
     notify("fitting the papers' model, then looking for causes")
     search = Search(readings, columns, effects, notify).fitted()
-    base, first = search.fit.only_active(), proposals(search)
-    scores = [score for score, _ in first]
+    base, scores = search.fit.only_active(), proposals(search)
     if not corrected:
         checks = all_checks(search.fit, search.given, search.noise)
         search = replace(search, detectable=detectable(search))
         faults = with_gains(search, raw, faults)
         return ProcedureResult(search, base, scores, faults, [], checks, 0.0, True, raw, whole)
     before, search = search.fit, drop_outliers(search)
-    first = first if search.fit is before else None
+    first = scores if search.fit is before else None
     del before  # it has derivatives of its own
     search = adopt(search, first).light()
     notify("fitting to the end")
@@ -204,17 +202,14 @@ def fit_coloured_noise(search: Search, without) -> Search:
     if COLOURED in without:
         return search
     made = beside_left(search)[0]
-    known = noises.observable(made.readings, made.basis)
-    triads = np.argwhere(known)
-    lagged = np.array([noise_effects.autocorrelation(made, *pair) for pair in triads])
-    coloured = search.noise.correlation[known] != 0
-    pooled = noise_effects.pooled_autocorrelation(made, search.noise, lagged)
-    if pooled < SETTINGS.limit(COLOURED):
-        coloured |= np.abs(lagged[:, 0]) * np.sqrt(lagged[:, 1]) > SETTINGS.clear
+    found = noise_effects.colours(made, search.noise)
+    coloured = search.noise.correlation[tuple(found.triads.T)] != 0
+    if noise_effects.pooled_autocorrelation(found) < SETTINGS.limit(COLOURED):
+        coloured |= np.abs(found.rho) * np.sqrt(found.pairs) > SETTINGS.clear
     if not coloured.any():
         return search
     correlation, sd = search.noise.correlation.copy(), search.readings.sd.copy()
-    for (imu, kind), (rho, _) in zip(triads[coloured], lagged[coloured], strict=True):
+    for (imu, kind), rho in zip(found.triads[coloured], found.rho[coloured], strict=True):
         correlation[imu, kind] = rho
         sd[imu, kind] *= np.sqrt(np.nanmean(noise_effects.triad(made, imu, kind) ** 2))
     readings = search.readings.with_sd(sd)

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from imuarray.diagnosis.fit import Fit
-from imuarray.diagnosis.scores import Candidate, Information, Scanned, Score
+from imuarray.diagnosis.scores import Candidate, Information, Score
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.heldout import blocks_of
 from imuarray.engine.parameters import POSITION
@@ -20,7 +20,7 @@ SHIFT = "position_shift"
 WARM_UP = "warm_up"
 
 
-def scan_shifts(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
+def scan_shifts(fit: Fit, given: Information, imus, _=None) -> list[Score]:
     """A step of each triad's position, and of all at once, at the instant where it gains most."""
     chosen, outside = fit.columns.of(POSITION), given.covariance(given.places(fit.active))
     blocks = blocks_of(len(fit.residual), SETTINGS.cuts)
@@ -40,10 +40,11 @@ def scan_shifts(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
         gain, shift, freedom = steps[best]
         tests = SETTINGS.cuts * (1 if whole else len(imus))
         log_p = log_chi_square(gain, freedom) + np.log(2 * tests)
-        score = Score(Candidate(SHIFT, tuple(moved), "", whole), gain, freedom, min(log_p, 0.0))
         since = fit.readings.time[blocks[best + 1].start]
-        starts = zip(moved, shift.reshape(-1, 3), strict=True)
-        found.append(Scanned(score, {imu: np.append(step, since) for imu, step in starts}))
+        steps = zip(moved, shift.reshape(-1, 3), strict=True)
+        starts = {imu: np.append(step, since) for imu, step in steps}
+        candidate = Candidate(SHIFT, tuple(moved), "", whole)
+        found.append(Score(candidate, gain, freedom, min(log_p, 0.0), starts))
     return found
 
 
@@ -84,9 +85,8 @@ def refine_instant(fit: Fit, imus, around: float) -> float:
     change = np.where(after, linear + square / 2, -(linear - square / 2))
     # cost of starting at sample n instead: samples between change their state
     first = int(np.argmax(after)) if after.any() else len(after) - 1
-    forward = np.concatenate([[0.0], np.cumsum(change[first:])])
-    backward = np.concatenate([[0.0], np.cumsum(-(linear - square / 2)[:first][::-1])])[::-1]
-    cost = np.concatenate([backward[:-1], forward[:-1]])
+    sooner, later = np.cumsum(change[:first][::-1])[::-1], np.cumsum(change[first:-1])
+    cost = np.concatenate([sooner, [0.0], later])
     return float(fit.readings.time[int(np.argmin(cost))])
 
 
@@ -169,7 +169,7 @@ class Courses:
         return pace, self.best_zero(pace)[1]
 
 
-def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
+def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Score]:
     """All IMUs' biases along the course where they gain most.
 
     Of both kinds and more than one IMU, more than as constants: else it is no thermometer.
@@ -200,8 +200,7 @@ def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
     log_p = min(log_chi_square(gain, freedom) + np.log(2 * len(SETTINGS.paces)), 0.0)
     each, shape = values.reshape(len(imus), 6), [pace / courses.span, zero]
     starts = {imu: np.append(own, shape) for imu, own in zip(imus, each, strict=True)}
-    score = Score(Candidate(WARM_UP, tuple(imus), "", True), gain, freedom, log_p)
-    return [Scanned(score, starts)]
+    return [Score(Candidate(WARM_UP, tuple(imus), "", True), gain, freedom, log_p, starts)]
 
 
 def maybe_grown(search, cause) -> bool:

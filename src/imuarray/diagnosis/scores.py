@@ -40,18 +40,12 @@ class Score:
     statistic: float
     freedom: int
     log_p: float
+    values: dict[int, np.ndarray] | None = None  # of a scan: where its parameters begin, by IMU
 
     @property
     def tries(self) -> float:
         """Nats that many tests took off."""
         return self.log_p - log_chi_square(self.statistic, self.freedom)
-
-
-class Scanned(NamedTuple):
-    """A scanned candidate's test and where its nonlinear parameters begin, by IMU."""
-
-    score: Score
-    values: dict[int, np.ndarray]
 
 
 class Conditional(NamedTuple):

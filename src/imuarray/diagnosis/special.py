@@ -12,7 +12,7 @@ import numpy as np
 from imuarray.diagnosis import scans as along_time
 from imuarray.diagnosis.fit import Fit, delay_score
 from imuarray.diagnosis.residual_checks import Check
-from imuarray.diagnosis.scores import Candidate, Information, Scanned, Score, score_all
+from imuarray.diagnosis.scores import Candidate, Information, Score, score_all
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import need
 from imuarray.engine.clocks import CLOCK, DELAY, age_of, sawtooth, sawtooths
@@ -24,7 +24,7 @@ from imuarray.tails import log_chi_square
 DRIFT = "bias_drift"
 
 
-def sawtooth_scan(fit: Fit, given: Information, imus, scores) -> list[Scanned]:
+def sawtooth_scan(fit: Fit, given: Information, imus, scores) -> list[Score]:
     """A sawtooth age for each IMU, and for those together that show one beyond a constant delay.
 
     The constant delays among the ``scores`` are what a clock must go beyond: its sawtooth counts
@@ -36,13 +36,13 @@ def sawtooth_scan(fit: Fit, given: Information, imus, scores) -> list[Scanned]:
     time = fit.readings.time
     each = sawtooths(time, score, information, imus, delays, partial(wider, fit, given))
     found = [
-        Scanned(_clock_score((imu,), gain, delays, len(time), len(imus)), {imu: values})
+        _clock_score({imu: values}, gain, delays, len(time), len(imus))
         for imu, (gain, values) in each.items()
     ]
     if len(each) > 1:
         gain = sum(gain for gain, _ in each.values())
-        several = _clock_score(tuple(each), gain, delays, len(time), 1)
-        found.append(Scanned(several, {imu: values for imu, (_, values) in each.items()}))
+        clocks = {imu: values for imu, (_, values) in each.items()}
+        found.append(_clock_score(clocks, gain, delays, len(time), 1))
     return found
 
 
@@ -59,12 +59,12 @@ def wider(fit: Fit, given: Information, imu: int, clock) -> float:
     return float(max(1.0, np.max((1 - rho**2) / (1 + rho**2 - 2 * rho * np.cos(turn)))))
 
 
-def _clock_score(imus, gain, delays, samples, count) -> Score:
-    freedom = 4 * len(imus)
+def _clock_score(clocks: dict, gain, delays, samples, count) -> Score:
+    imus, freedom = tuple(clocks), 4 * len(clocks)
     statistic = gain + delays.get(imus, sum(delays.get((imu,), 0.0) for imu in imus))
     tried = len(imus) * (ENGINE.many + np.log(samples)) + np.log(count)
     log_p = log_chi_square(statistic, freedom) + tried
-    return Score(Candidate(CLOCK, imus), float(statistic), freedom, min(log_p, 0.0))
+    return Score(Candidate(CLOCK, imus), float(statistic), freedom, min(log_p, 0.0), clocks)
 
 
 def maybe_clock(search, cause, own: float) -> bool:
@@ -108,7 +108,7 @@ def placebo_of_ages(search) -> tuple[float, float]:
 class Special(NamedTuple):
     """An effect's own steps; None where it has none."""
 
-    scan: Callable | None = None  # (fit, given, imus, scores) -> [Scanned] of those IMUs
+    scan: Callable | None = None  # (fit, given, imus, scores) -> [Score] of those IMUs
     linear: bool = True  # whether one linearisation at what was found predicts anything
     refine: Callable | None = None  # (search, imus) -> search, after its adoption
     maybe: Callable | None = None  # (search, cause, chi-square) -> may it be what is named so?
@@ -116,7 +116,7 @@ class Special(NamedTuple):
     check: Callable | None = None  # (search, cause) -> [Check]
 
 
-def scans(search, scores) -> list[Scanned]:
+def scans(search, scores) -> list[Score]:
     """All scans, of IMUs that can have the effect and have not."""
     exists, found = search.readings.exists, []
     for effect, special in SPECIAL.items():

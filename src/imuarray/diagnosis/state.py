@@ -134,11 +134,14 @@ class Search:
         state = self.fit.state if state is None else state
         search, turns = self, turns + bool(self.clocks)
         for turn in range(turns + 2):
-            search = search._without_jumps(state, turn)
-            state, converged, linearised = search_optimum(
-                search.readings, search.columns, search.active, state, search.smooth, rough
+            width = SETTINGS.jitter if state.gyroscopes_free else CLOCKS.edge / (1 + turn)
+            readings, jumps = without_jumps(
+                search._with_jumps, search.columns, state, search.clocks, width
             )
-            readings = search.readings
+            search = replace(search, readings=readings, jumps=jumps)
+            state, converged, linearised = search_optimum(
+                readings, search.columns, search.active, state, search.smooth, rough
+            )
             found = noises.estimated(readings, linearised.residual, linearised.basis)
             del linearised  # large
             change = np.max(np.abs(found.sd / readings.sd - 1)[readings.exists])
@@ -163,12 +166,6 @@ class Search:
     def _with_jumps(self) -> Readings:
         """The readings, those near a clock's jump too."""
         return replace(self.readings, keep=self.readings.keep | self.jumps)
-
-    def _without_jumps(self, state: State, turn: int) -> Self:
-        """Without the readings near the jumps of the clocks at a state."""
-        width = SETTINGS.jitter if state.gyroscopes_free else CLOCKS.edge / (1 + turn)
-        readings, jumps = without_jumps(self._with_jumps, self.columns, state, self.clocks, width)
-        return replace(self, readings=readings, jumps=jumps)
 
     def ending(self, made: Fit, noise: noises.Noise) -> Self:
         """With a fit, and the noise there."""

@@ -11,9 +11,9 @@ from imuarray.engine.parameters import POSITION, Columns
 from imuarray.engine.readings import Readings
 from imuarray.linear import triangular_inverse
 from imuarray.model import ArrayModel
+from imuarray.model.array_model import by_effects, stacked
 from imuarray.model.effects import Instant, Turning
 from imuarray.model.jax64 import jax, jnp
-from imuarray.model.slopes import by_effects, stacked
 from imuarray.motion.state import Motion
 
 KNOWN = 9  # the motion that the papers' model knows: omega, omega_dot, s
