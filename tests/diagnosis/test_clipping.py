@@ -64,7 +64,7 @@ def test_findings_of_both_kinds_are_one_cause():
     old = Finding("saturation", (1, 4), -20.0, {}, says="piles")
     new = Finding("saturation", (2,), -30.0, {}, says="alone")
     other = Finding("stale_samples", (0,), -40.0, {}, says="repeats")
-    merged = together([old, other], [new])
+    merged = together([old, other], new)
     assert merged == [old._replace(imus=(1, 2, 4), log_p=-30.0), other]
 
 

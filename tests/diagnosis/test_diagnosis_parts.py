@@ -15,7 +15,7 @@ from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects as variance
 from imuarray.diagnosis.adoption import narrowest
 from imuarray.diagnosis.fit import fit, log_scores, search_optimum
-from imuarray.diagnosis.replicates import Replicator, discrepancies
+from imuarray.diagnosis.replicates import discrepancies, replicator
 from imuarray.diagnosis.scores import (
     Candidate,
     Score,
@@ -245,10 +245,10 @@ def constants(made, inside):
 
 def test_noise_scales_are_unbiased_with_the_errors_they_claim(clean):
     """The residual of replicates, refitted: z of the log ratios has mean 0 and sd 1."""
-    replicator = Replicator(clean.fit)
+    draw = replicator(clean.fit)
     rng, z = np.random.default_rng(8), []
     for _ in range(12):
-        drawn = replace(clean.fit, residual=replicator.draw(rng))
+        drawn = replace(clean.fit, residual=draw(rng))
         log_ratio, covariance = variance.whole_scales(drawn)
         z.append(log_ratio / np.sqrt(np.diag(covariance)))
     z = np.array(z)
@@ -341,9 +341,9 @@ def test_a_clock_in_coloured_noise_must_show_more():
 
 
 def test_replicates_have_the_residual_s_size(clean):
-    replicator = Replicator(clean.fit)
+    draw = replicator(clean.fit)
     rng = np.random.default_rng(4)
-    drawn = np.array([replicator.draw(rng) for _ in range(8)])
+    drawn = np.array([draw(rng) for _ in range(8)])
     share = 1.0 - clean.fit.leverage
     assert np.mean(drawn**2) / np.mean(share) == pytest.approx(1.0, abs=0.01)
     ratio = np.mean(drawn**2, axis=(0, 1)) / np.mean(share, axis=0)

@@ -233,11 +233,11 @@ def rivals(search: Search, cause: Cause) -> list[str]:
     effect, given, fit_ = cause.effect, search.given, search.fit
     freed = given.places(freed_mask(search, effect))
     whole = len(cause.imus) > len(fit_.readings.exists) / 2
+    present = {c.effect for c in search.causes}
     tried = [
         c for c in candidates(fit_.columns, fit_.readings.exists, search.effects)
-        if c.effect != effect and (c.whole if whole else c.imus == cause.imus)
+        if c.effect not in present and (c.whole if whole else c.imus == cause.imus)
     ]  # fmt: skip
-    present = {c.effect for c in search.causes}
     own, freedom = need(search, effect)
     own_log = log_chi_square(own, freedom) if freedom else 0.0
     scores = {s.candidate.effect: s for s in reversed(score_all(given, fit_, tried, freed))}
@@ -247,16 +247,12 @@ def rivals(search: Search, cause: Cause) -> list[str]:
     power = given.values[freed] @ left[np.ix_(freed, freed)] @ given.values[freed]
     found = []
     for candidate in tried:
-        if candidate.effect in present or candidate.effect in found:
-            continue
-        score = scores.get(candidate.effect)
+        other, score = candidate.effect, scores.get(candidate.effect)
         close = score is not None and score.log_p - own_log < SETTINGS.rival
-        nested = (
-            candidate.effect in parts_of(effect) or effect in EFFECTS[candidate.effect].contains
-        )
+        nested = other in parts_of(effect) or effect in EFFECTS[other].contains
         shared = 0.0 if nested else _shared(given, fit_, candidate, left, signal)
         if close or shared > SETTINGS.alike * power:
-            found.append(candidate.effect)
+            found.append(other)
     return list(dict.fromkeys([*found, *wider(search, cause, own)]))
 
 

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -186,10 +187,8 @@ def rivals_of(found: ProcedureResult) -> tuple[Fitted, Fitted]:
     search, options = found.search, {"rough": True, "all_columns": False}
     alone = search.columns.mask([POSITION])
     start = found.base.state._replace(parameters=np.zeros_like(found.base.state.parameters))
-    declared_noise = replace(search.readings, sd=search.readings.declared)
-    if found.reading_faults:
-        # as read: the rivals know neither of rails nor of repeats nor of exchanged axes
-        declared_noise = replace(declared_noise, values=found.raw.values)
+    # as read: the rivals know neither of rails nor of repeats nor of exchanged axes
+    declared_noise = replace(search.readings, sd=search.readings.declared, values=found.raw.values)
     declared = fit(declared_noise, search.columns, alone, start, search.smooth, **options)
     known = observable(declared_noise, declared.basis)[..., None]
     squares = np.where(known, per_triad(standardised(declared)) ** 2, 1.0)
@@ -279,12 +278,10 @@ def parameters_of(search: Search, cause: Cause, sds) -> dict:
     active, item = search.active, known_effect(cause.effect)
     held = (*item.held, *(item.held_rough if search.fit.state.gyroscopes_free else ()))
     found = {}
-    for imu in cause.imus:
-        for column in columns.of(cause.effect):
-            place = columns.places[column]
-            fixed = bool(place) and place[-1] in held
-            if not (active[imu, column] or fixed):
-                continue
+    for imu, column in product(cause.imus, columns.of(cause.effect)):
+        place = columns.places[column]
+        fixed = bool(place) and place[-1] in held
+        if active[imu, column] or fixed:
             name = f"{component(cause.effect, place)}_{search.readings.labels[imu]}"
             sd = None if fixed else float(sds[imu, column])
             found[name] = float(values[imu, column]), sd, unit_of(cause.effect, place)

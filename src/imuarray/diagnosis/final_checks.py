@@ -89,7 +89,7 @@ def leave_out_clips(search: Search, faults, without=()) -> tuple[Search, list[Fi
     search = replace(search, readings=search.readings.without(lost)).refit()
     says = "the largest reading alone stays below what it should be, as at a rail"
     found = rails_cause([(peak.imu, peak.kind, peak.size) for peak in hit], log_p, says)
-    return replace(search, allowed=search.allowed & ~lost), together(faults, [found])
+    return replace(search, allowed=search.allowed & ~lost), together(faults, found)
 
 
 def with_gains(search: Search, raw: Readings, faults: list[Finding]) -> list[Finding]:
@@ -115,14 +115,12 @@ def with_gains(search: Search, raw: Readings, faults: list[Finding]) -> list[Fin
     return found
 
 
-def together(first: list[Finding], second: list[Finding]) -> list[Finding]:
-    """Both lists, what is in both as one cause in the first's words."""
-    names = {item.effect: item for item in first}
-    for new in second:
-        old = names.get(new.effect, new)
-        imus = tuple(sorted({*old.imus, *new.imus}))
-        names[new.effect] = old._replace(imus=imus, log_p=min(old.log_p, new.log_p))
-    return list(names.values())
+def together(faults: list[Finding], new: Finding) -> list[Finding]:
+    """The faults and one more, with one of the same effect as one cause in that one's words."""
+    old = next((item for item in faults if item.effect == new.effect), new)
+    imus = tuple(sorted({*old.imus, *new.imus}))
+    both = old._replace(imus=imus, log_p=min(old.log_p, new.log_p))
+    return [both if item is old else item for item in faults] + [both] * (old is new)
 
 
 def lone_checks(made: Fit, tailed) -> list[Check]:

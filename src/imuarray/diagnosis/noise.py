@@ -9,6 +9,7 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.settings import SETTINGS
@@ -102,11 +103,8 @@ def _outliers(fast, core) -> np.ndarray:
     """Triad-samples that stand out of their neighbours, (T, N, 2) bool."""
     size = np.abs(np.nan_to_num(fast)) / np.repeat(core, 3, axis=1)
     worst = size.reshape(len(size), -1, 2, 3).max(axis=-1)
-    peak = worst > SETTINGS.far
-    for shift in range(1, HALF + 1):
-        peak[shift:] &= worst[shift:] >= worst[:-shift]
-        peak[:-shift] &= worst[:-shift] >= worst[shift:]
-    return few_at_once(peak)
+    highest = maximum_filter1d(worst, 2 * HALF + 1, axis=0, mode="nearest")
+    return few_at_once((worst > SETTINGS.far) & (worst >= highest))
 
 
 def _colour(unit, known):

@@ -52,7 +52,7 @@ def find_repeats(readings: Readings):
         same = close & together[:, None]
         every = same.all(axis=1)
         log_p = log_poisson(every.sum(), max(_by_chance(same, every), 1e-9 * together.sum()))
-        if every.sum() >= SETTINGS.least_repeats and log_p < SETTINGS.rare_repeats:
+        if log_p < SETTINGS.rare_repeats:
             # after a gap, the sample before is not at hand
             triads(lost)[1:, imu, kind] = (every | ~together)[:, None]
             found.append((int(imu), every.mean(), float(log_p)))

@@ -35,32 +35,32 @@ class Discrepancy(NamedTuple):
     says: str
 
 
-class Replicator:
-    """Draws residuals (T, N, 6) of the fitted model, in the units of the noise sd in use."""
+def replicator(fit: Fit) -> Callable[[np.random.Generator], np.ndarray]:
+    """Draws residuals (T, N, 6) of the fitted model, in the units of the noise sd in use.
 
-    def __init__(self, fit: Fit):
-        self.fit, self.pairs = fit, np.argwhere(fit.active)
-        information, _ = fit.normal(fit.active)
-        self.inverse = np.linalg.pinv(information + fit.precision, hermitian=True)
-        place = np.searchsorted(fit.wanted, self.pairs[:, 1])
-        own = [np.flatnonzero(self.pairs[:, 0] == k) for k in range(len(fit.active))]
-        # of each IMU (T 6, n): what moves its readings
-        self.along = [
-            (rows, fit.whitened[:, k][..., place[rows]].reshape(6 * len(fit.residual), len(rows)))
-            for k, rows in enumerate(own)
-        ]
+    After motion and parameters have been fitted to them.
+    """
+    pairs = np.argwhere(fit.active)
+    inverse = np.linalg.pinv(fit.normal(fit.active)[0] + fit.precision, hermitian=True)
+    place = np.searchsorted(fit.wanted, pairs[:, 1])
+    own = [np.flatnonzero(pairs[:, 0] == k) for k in range(len(fit.active))]
+    # of each IMU (T 6, n): what moves its readings
+    each = [
+        (rows, fit.whitened[:, k][..., place[rows]].reshape(6 * len(fit.residual), len(rows)))
+        for k, rows in enumerate(own)
+    ]
 
-    def draw(self, rng) -> np.ndarray:
-        """One residual after motion and parameters have been fitted to it."""
-        fit = self.fit
+    def draw(rng) -> np.ndarray:
         noise = rng.standard_normal(fit.residual.shape) * fit.readings.keep
-        left, score = fit.less_motion(noise), np.empty(len(self.pairs))
-        for k, (rows, along) in enumerate(self.along):
+        left, score = fit.less_motion(noise), np.empty(len(pairs))
+        for k, (rows, along) in enumerate(each):
             score[rows] = left[:, k].ravel() @ along
-        step = self.inverse @ score
-        moved = [along @ step[rows] for rows, along in self.along]
-        moved = np.stack(moved).reshape(len(moved), len(left), 6).swapaxes(0, 1)
+        step = inverse @ score
+        moved = np.stack([along @ step[rows] for rows, along in each])
+        moved = moved.reshape(len(moved), len(left), 6).swapaxes(0, 1)
         return left - fit.less_motion(moved)
+
+    return draw
 
 
 class Sensors:
@@ -202,10 +202,10 @@ TESTS = {
 
 def discrepancies(fit: Fit, rng, replicates: int) -> list[Discrepancy]:
     """Every test quantity of a fit beside its band over replicates, most striking first."""
-    replicator, kinds = Replicator(fit), [Sensors(fit, kind) for kind in range(len(KINDS))]
+    draw, kinds = replicator(fit), [Sensors(fit, kind) for kind in range(len(KINDS))]
     share = fit.readings.keep / np.sqrt(np.maximum(1.0 - fit.leverage, 1e-6))
     measured = quantities(standardised(fit), kinds)
-    drawn = [quantities(replicator.draw(rng) * share, kinds) for _ in range(replicates)]
+    drawn = [quantities(draw(rng) * share, kinds) for _ in range(replicates)]
     found = [
         _compare(kinds[key[0]].labels, *key, values, np.array([each[key] for each in drawn]))
         for key, values in measured.items()

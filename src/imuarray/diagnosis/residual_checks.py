@@ -90,14 +90,12 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
     axes = []
     for imu in range(count):
         common = features(fit, imu)
-        for axis in range(6):
-            if not fit.readings.exists[imu, axis // 3]:
-                continue
-            table = dict(common)
-            if axis < 3:
-                # boards bend, mounts give way
-                for cause in ("force", "time"):
-                    table[f"lever times {cause}"] = displaced(motion, common[cause], axis)
+        for axis in np.flatnonzero(np.repeat(fit.readings.exists[imu], 3)):
+            # boards bend, mounts give way
+            table = common | {
+                f"lever times {cause}": displaced(motion, common[cause], axis)
+                for cause in ("force", "time") if axis < 3
+            }  # fmt: skip
             names = np.repeat(list(table), [v.shape[1] for v in table.values()])
             stacked = np.hstack(list(table.values()))
             seen = -np.einsum("ti,tia->ta", basis[:, imu, axis], projected)

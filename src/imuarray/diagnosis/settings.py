@@ -28,7 +28,6 @@ class Settings:
     large: int = 32  # IMUs; of more, so many samples less
     equal: float = 1e-9  # m/s^2 or rad/s, relative above 1: rounding of maps put back
     repeats_block: int = 64  # samples in which axes repeat alike often by chance
-    least_repeats: int = 1  # samples that a triad repeats
     least_clipped: int = 3  # readings at one value that make a rail
     rare_repeats: float = -12.0  # log p from which repeats are no chance of a coarse converter
     near_turn: float = 0.5  # norm by which a triad's matrix may miss a signed permutation

@@ -72,8 +72,8 @@ def find_shocks(fit: Fit, limit: float) -> tuple[Finding | None, np.ndarray]:
     nats = np.where(shaken, (found.least - rest) / 2, 0.0)
     imus = tuple(range(fit.residual.shape[1]))
     where = _stretches(fit.readings.time + fit.readings.origin, fit.readings.run, shaken)
-    also = {"stretches_s": where}
-    return Finding(SHOCK, imus, log_p, numbers, *held_out(nats), also=also), shaken
+    own = Finding(SHOCK, imus, log_p, numbers, *held_out(nats), also={"stretches_s": where})
+    return own, shaken
 
 
 def with_neighbours(shaken, run, number: int) -> np.ndarray:
@@ -118,6 +118,5 @@ def _stretches(time, run, shaken):
     """[first, last] s of up to `SETTINGS.stated` shaken stretches, the longest first."""
     index = np.flatnonzero(shaken)
     cut = np.flatnonzero((np.diff(index) > SETTINGS.apart) | (np.diff(run[index]) > 0)) + 1
-    parts = [part for part in np.split(index, cut) if len(part)]
-    longest = sorted(parts, key=len)[-SETTINGS.stated :]
+    longest = sorted(np.split(index, cut), key=len)[-SETTINGS.stated :]
     return [[float(time[p[0]]), float(time[p[-1]])] for p in longest[::-1]]

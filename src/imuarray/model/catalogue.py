@@ -139,8 +139,7 @@ def gyroscope_nonlinearity(curvature, instant, predicted):
 
 @effect(
     "accelerometer_rate_square", unit="m rad-2", prior_sd=5e-4, shape=lambda a, g: (a, 3),
-    critical=-9.0,
-    gauge=each_mean, smooth=True, against="angular rate",
+    critical=-9.0, gauge=each_mean, smooth=True, against="angular rate",
     meaning="accelerometers read more with the square of the rate",
 )  # fmt: skip
 def accelerometer_rate_square(growth, instant, predicted):
