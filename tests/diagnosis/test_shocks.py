@@ -57,7 +57,7 @@ def test_shocks_are_found_where_they_are():
     since = (time[:, None] - begin)[np.arange(len(time)), np.searchsorted(begin, time) - 1]
     assert np.all((since > -0.01) & (since < 0.2))
     assert named.parameters["share"][0] == shaken.mean() and named.gain > 0
-    assert all(any(a <= t <= b for a, b in named.where) for t in time)
+    assert all(any(a <= t <= b for a, b in named.also["stretches_s"]) for t in time)
 
 
 def test_what_rings_beside_a_shock_is_left_out_with_it():
