@@ -21,7 +21,6 @@ from imuarray.diagnosis.scores import (
     Score,
     candidates,
     information_at,
-    mask_of,
     score_all,
 )
 from imuarray.diagnosis.settings import SETTINGS as CRITICAL
@@ -160,7 +159,7 @@ def test_a_score_is_what_a_refit_gains(scaled):
     }
     for effect, imu in (("gyroscope_scale", 2), ("accelerometer_bias", 4), ("gyroscope_delay", 6)):
         score = scores[effect, (imu,)]
-        active = scaled.active | mask_of(scaled.columns, score.candidate)
+        active = scaled.active | score.candidate.mask(scaled.columns)
         made = fit(scaled.readings, scaled.columns, active, scaled.fit.state, scaled.smooth)
         gained = objective(scaled.fit) - objective(made)
         assert score.statistic == pytest.approx(gained, rel=0.05, abs=0.3), effect

@@ -9,15 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from imuarray.diagnosis.fit import Fit, at, likely_sizes, normal_blocks
-from imuarray.diagnosis.scores import (
-    Candidate,
-    Information,
-    Score,
-    candidates,
-    detectable,
-    mask_of,
-    score_all,
-)
+from imuarray.diagnosis.scores import Candidate, Information, Score, candidates, score_all
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL, scans
 from imuarray.diagnosis.state import Cause, Search, freed_mask, heldout_gain, need, prune
@@ -78,7 +70,7 @@ def adopt(search: Search, proposed=None) -> Search:
         vain = [] if adopted else [*vain, best.candidate.effect]
         proposed = None if adopted else [p for p in proposed if p is not best]
         search = found
-    return replace(search, detectable=detectable(search))
+    return search.with_sizes()
 
 
 def narrowest(proposed, search: Search) -> Score:
@@ -272,6 +264,6 @@ def wider(search: Search, cause: Cause, own: float) -> list[str]:
 
 def _shared(given, fit_, candidate, left, signal) -> float:
     """Share of a signal's power that a candidate could explain."""
-    chosen = given.places(mask_of(fit_.columns, candidate))
+    chosen = given.places(candidate.mask(fit_.columns))
     block = left[np.ix_(chosen, chosen)]
     return scaled_square(block, signal[chosen], SETTINGS.observed, given.scale[chosen])[0]

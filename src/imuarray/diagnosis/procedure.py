@@ -18,7 +18,7 @@ from imuarray.diagnosis.fit import Fit, fit
 from imuarray.diagnosis.noise_effects import COLOURED, SCALES, TAILS
 from imuarray.diagnosis.reading_effects import Finding, find_reading_faults
 from imuarray.diagnosis.residual_checks import Check, all_checks
-from imuarray.diagnosis.scores import Score, detectable
+from imuarray.diagnosis.scores import Score
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK, find_shocks, with_neighbours
 from imuarray.diagnosis.state import Search, eliminate
@@ -71,8 +71,7 @@ def run_procedure(
     base, scores = search.fit.only_active(), proposals(search)
     if not corrected:
         checks = all_checks(search.fit, search.given, search.noise)
-        search = replace(search, detectable=detectable(search))
-        faults = with_gains(search, raw, faults)
+        search, faults = search.with_sizes(), with_gains(search, raw, faults)
         return ProcedureResult(search, base, scores, faults, [], checks, 0.0, True, raw, whole)
     before, search = search.fit, drop_outliers(search)
     first = scores if search.fit is before else None

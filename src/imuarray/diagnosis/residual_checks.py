@@ -12,6 +12,7 @@ from scipy.ndimage import median_filter
 
 from imuarray.diagnosis.fit import Fit, delay_score
 from imuarray.diagnosis.noise import Noise, observable, standardised
+from imuarray.diagnosis.reading_effects import triads
 from imuarray.diagnosis.replicates import motion_sizes
 from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
@@ -172,21 +173,18 @@ def _worst(name, found) -> Check:
 
 def size_checks(fit: Fit) -> list[Check]:
     """Does the residual's size grow with the motion's? A regression of its square per triad."""
-    unit = standardised(fit)
-    triads = np.argwhere(observable(fit.readings, fit.basis))
-    checks = []
+    pairs, unit = np.argwhere(observable(fit.readings, fit.basis)), triads(standardised(fit))
+    squares, checks = [unit[:, imu, kind] ** 2 for imu, kind in pairs], []
+    each = [np.nan_to_num(square / np.nanmean(square) - 1).sum(axis=1) for square in squares]
     for name, values in motion_sizes(fit).items():
         size = np.sum(values**2, axis=1)
         if not np.any(size):
             continue
         trend = (size - size.mean()) / size.std()
-        found = []
-        for imu, kind in triads:
-            square = unit[:, imu, 3 * kind : 3 * kind + 3] ** 2
-            average = np.nanmean(square)
-            excess = np.nan_to_num(square / average - 1).sum(axis=1)
-            spread = np.sqrt(np.sum((trend * excess) ** 2))
-            found.append((imu, (trend @ excess) / spread))
+        found = [
+            (imu, (trend @ excess) / np.sqrt(np.sum((trend * excess) ** 2)))
+            for (imu, _), excess in zip(pairs, each, strict=True)
+        ]
         checks.append(normal_checks(f"residual's size against {name}", found))
     return checks
 
@@ -251,11 +249,10 @@ def correlation_check(fit: Fit, noise: Noise) -> Check:
 
 def noise_checks(noise: Noise, exists) -> list[Check]:
     """Outliers and colour that are still there."""
-    triads = np.argwhere(exists)
-    tails = log_poisson(noise.outliers, noise.expected)
-    worst = min(triads, key=lambda t: tails[tuple(t)])
-    number, log_p = noise.outliers[tuple(worst)], tails[tuple(worst)] + np.log(len(triads))
-    found = [(i, noise.slope[i, k]) for i, k in triads]
+    places, tails = np.argwhere(exists), log_poisson(noise.outliers, noise.expected)
+    worst = min(places, key=lambda t: tails[tuple(t)])
+    number, log_p = noise.outliers[tuple(worst)], tails[tuple(worst)] + np.log(len(places))
+    found = [(i, noise.slope[i, k]) for i, k in places]
     return [Check.of("outliers", number, log_p, worst[0]), normal_checks("whiteness", found)]
 
 

@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special as special
 
-from imuarray.diagnosis.fit import Fit
+from imuarray.diagnosis.fit import Fit, normal_blocks
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.heldout import blocks_of
 from imuarray.engine.parameters import Columns
 from imuarray.linear import scaled_eigh, scaled_inverse
 from imuarray.model.array_model import component, unit_of
@@ -30,6 +29,14 @@ class Candidate:
     imus: tuple[int, ...]
     variant: str = ""
     whole: bool = False  # all IMUs that can have it
+
+    def mask(self, columns: Columns) -> np.ndarray:
+        """Its parameters (N, m) bool."""
+        found = columns.mask([self.effect], self.imus)
+        if self.variant:
+            inside = dict(EFFECTS[self.effect].forms)[self.variant]
+            found[:, [c for c in columns.of(self.effect) if not inside(columns.places[c])]] = False
+        return found
 
 
 @dataclass(frozen=True)
@@ -69,17 +76,6 @@ class ObservedDirections(NamedTuple):
 def variants(effect: str) -> tuple[str, ...]:
     """The forms an effect is tested in."""
     return tuple(name for name, _ in EFFECTS[effect].forms) or ("",)
-
-
-def mask_of(columns: Columns, candidate: Candidate) -> np.ndarray:
-    """The parameters (N, m) bool of a candidate."""
-    chosen = columns.of(candidate.effect)
-    if candidate.variant:
-        inside = dict(EFFECTS[candidate.effect].forms)[candidate.variant]
-        chosen = [column for column in chosen if inside(columns.places[column])]
-    out = np.zeros(columns.owner.shape, bool)
-    out[np.ix_(list(candidate.imus), chosen)] = True
-    return out & columns.owner
 
 
 def candidates(columns: Columns, exists, effects) -> list[Candidate]:
@@ -189,7 +185,7 @@ def score_all(given: Information, fit: Fit, tried: list[Candidate], freed=()) ->
     conditional = given.conditional(active, freed)
     found = []
     for candidate in tried:
-        chosen = np.setdiff1d(given.places(mask_of(fit.columns, candidate)), active)
+        chosen = np.setdiff1d(given.places(candidate.mask(fit.columns)), active)
         if not len(chosen):
             continue
         statistic, freedom = given.test(conditional, chosen)
@@ -218,11 +214,10 @@ def detectable(search) -> dict[str, dict]:
     inside = {part for c in search.causes for part in EFFECTS[c.effect].contains}
     effects = [effect for effect in search.effects if effect not in inside]
     every = candidates(columns, search.readings.exists, effects)
-    described, blocks = search.fit.described, blocks_of(len(search.fit.residual))
-    scores = np.array([search.fit.normal(described, block)[1] for block in blocks])
+    scores = np.array([score for _, score in normal_blocks(search.fit, search.fit.described)])
     found: dict[str, dict] = {}
     for candidate in every:
-        mask = mask_of(columns, candidate)
+        mask = candidate.mask(columns)
         chosen = np.sort(given.places(mask))
         if len(candidate.imus) > 1 or not len(chosen):
             continue

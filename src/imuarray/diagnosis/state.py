@@ -13,7 +13,7 @@ import numpy as np
 
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis.fit import Fit, at, likely_sizes, normal_blocks, search_optimum
-from imuarray.diagnosis.scores import Candidate, Information, information_at, mask_of
+from imuarray.diagnosis.scores import Candidate, Information, detectable, information_at
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.clocks import CLOCK, estimated_again, started_by_gyroscopes, without_jumps
 from imuarray.engine.estimate import Recorded
@@ -80,7 +80,7 @@ class Search:
         mask = self.columns.mask([POSITION])
         for cause in self.causes:
             for variant in cause.variants:
-                mask |= mask_of(self.columns, Candidate(cause.effect, cause.imus, variant))
+                mask |= Candidate(cause.effect, cause.imus, variant).mask(self.columns)
         return mask
 
     @property
@@ -122,6 +122,10 @@ class Search:
         begun = Recorded.of(self.readings, self.columns)
         search = replace(self, allowed=self.readings.keep, smooth=begun.smooth).refit(begun.state)
         return replace(search, excess=search.left)
+
+    def with_sizes(self) -> Self:
+        """With the sizes of effects that would have been named."""
+        return replace(self, detectable=detectable(self))
 
     def light(self) -> Self:
         """The search without the derivatives that its next fit makes anew."""
