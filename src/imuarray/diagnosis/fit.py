@@ -8,14 +8,7 @@ import numpy as np
 from imuarray.engine.alike import sized_groups, with_likely_spread
 from imuarray.engine.clocks import DELAY, delay_parts
 from imuarray.engine.heldout import Scores, blocks_of, log_densities, scores_of
-from imuarray.engine.linearise import (
-    Eliminated,
-    State,
-    leverage_of,
-    linearise,
-    projection_of,
-    relinearised,
-)
+from imuarray.engine.linearise import State, leverage_of, linearise, projection_of, relinearised
 from imuarray.engine.normal import score_of, summed_normal
 from imuarray.engine.parameters import Columns, stepped
 from imuarray.engine.readings import Readings
@@ -164,7 +157,7 @@ def search_optimum(readings, columns, active, state, smooth, rough):
     return whole.unflat(state, parameters), converged, linearised
 
 
-def advance(columns, state, active, step, few, linearised: Eliminated, length) -> State:
+def advance(columns, state, active, step, few, linearised, length) -> State:
     """The state after ``length`` of a step of the active parameters, and the motion's own step."""
     step = length * step
     blocks = np.zeros(few.shape)

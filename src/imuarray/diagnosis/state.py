@@ -72,7 +72,7 @@ class Search:
     jumps: np.ndarray | bool = False  # (T, N, 6) bool, readings left out near a clock's jump
     allowed: np.ndarray | None = None  # (T, N, 6) bool, readings that count, outliers included
     trace: tuple[tuple[str, float], ...] = ()  # (effect, nats gained) of each adoption
-    detectable: dict[str, dict] = field(default_factory=dict)  # as `detectable.detectable` has it
+    detectable: dict[str, dict] = field(default_factory=dict)  # as `scores.detectable` has it
 
     @cached_property
     def active(self) -> np.ndarray:
