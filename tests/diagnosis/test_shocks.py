@@ -8,7 +8,7 @@ import pytest
 
 from imuarray.diagnosis.procedure import unshaken
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.shocks import SHOCK, find_shocks, misfits, with_neighbours
+from imuarray.diagnosis.shocks import SHOCK, _several, find_shocks, misfits, with_neighbours
 from imuarray.diagnosis.state import Search
 from imuarray.engine.parameters import columns_of
 from imuarray.engine.readings import arrange
@@ -86,6 +86,16 @@ def test_nothing_else_is_a_shock(effect, imus, size):
     made, _ = fitted(effect, imus, size)
     named, shaken = find_shocks(made, SETTINGS.limit(SHOCK))
     assert named is None and not shaken.any()
+
+
+def test_imus_that_are_off_by_themselves_are_several_by_chance():
+    """As many as are seen; where hardly a sample is calm nothing tells how many that is."""
+    rng, size = np.random.default_rng(5), np.arange(20000.0)
+    share = 0.1 * size / size.max() + 0.7 * (size >= 18000)
+    off = rng.random((len(size), 8)) < share[:, None]
+    several, alone, worst = off.sum(axis=1) > 1, off.sum(axis=1) == 1, np.argmax(off, axis=1)
+    seen, chance = _several(several, alone, worst, size)
+    assert seen == several[:18000].sum() and abs(seen - chance) < 4 * np.sqrt(seen)
 
 
 def test_the_only_gyroscope_cannot_be_left_out():

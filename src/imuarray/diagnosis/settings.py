@@ -86,6 +86,7 @@ class Settings:
     least_shaken: int = 4  # IMUs; with one of fewer left out, too little is there to agree
     shaken: float = 1e-7  # chance of a sample of plain noise to be called shaken
     ringing: float = 1e-2  # the same beside a shaken sample
+    few_calm: float = 0.1  # of like samples, from which they tell what several IMUs do by chance
     beside_shocks: int = 2  # samples left out on each side of a shaken one: some ringing is there
     lasting: float = 0.5  # of a shaken sample's residual that the next one has: misfit, no shock
     apart: int = 5  # samples between two shaken ones that are of two stretches

@@ -62,8 +62,8 @@ def find_shocks(fit: Fit, limit: float) -> tuple[Finding | None, np.ndarray]:
     alone = ~shaken & (found.whole > special.chdtri(found.freedom, SETTINGS.shaken))
     jerk = np.linalg.norm(fit.state.jerk[1], axis=1)
     rate = np.linalg.norm(fit.state.motion[:, :3], axis=1)
-    chance = max(_by_chance(shaken, alone, found.worst, size) for size in (jerk, rate))
-    log_p = float(log_poisson(shaken.sum(), max(chance, 0.5)))
+    counts = [_several(shaken, alone, found.worst, size) for size in (jerk, rate)]
+    log_p = max(float(log_poisson(seen, max(chance, 0.5))) for seen, chance in counts)
     if shaken.sum() <= SETTINGS.few or log_p > limit or _likeness(fit, shaken) > SETTINGS.lasting:
         return None, none
     # what is left of the ringing beside them
@@ -86,14 +86,19 @@ def with_neighbours(shaken, run, number: int) -> np.ndarray:
     return found
 
 
-def _by_chance(shaken, alone, worst, size) -> float:
-    """Samples in which several IMUs would be off if each was so by itself, tenths by ``size``."""
-    number = 0.0
+def _several(shaken, alone, worst, size) -> tuple[int, float]:
+    """(samples with several IMUs off, how many would be if each was so by itself).
+
+    By tenths of ``size``, of those in which enough samples are calm to tell chance by.
+    """
+    seen, chance = 0, 0.0
     for part in np.array_split(np.argsort(size), 10):
-        quiet = np.sum(~shaken[part] & ~alone[part]) + 0.5
-        odds = np.bincount(worst[part][alone[part]], minlength=worst.max() + 1) / quiet
-        number += quiet * (np.prod(1 + odds) - 1 - np.sum(odds))
-    return float(number)
+        calm = np.sum(~shaken[part] & ~alone[part]) + 0.5
+        if calm > SETTINGS.few_calm * len(part):
+            odds = np.bincount(worst[part][alone[part]], minlength=worst.max() + 1) / calm
+            seen += int(shaken[part].sum())
+            chance += float(calm * (np.prod(1 + odds) - 1 - np.sum(odds)))
+    return seen, chance
 
 
 def _likeness(fit: Fit, shaken) -> float:
