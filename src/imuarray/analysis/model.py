@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from imuarray.analysis import methods
-from imuarray.errors import LARGEST, SMALLEST, require
+from imuarray.errors import LARGEST, SMALLEST, InputError, require
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model.effects import find_effects
 from imuarray.recording import Recording
@@ -23,8 +23,10 @@ def assumed(recording: Recording, accelerometer_noise: float | None) -> Recordin
     """The recording with another accelerometer noise (m/s^2) than it declares, if one is given."""
     if accelerometer_noise is None:
         return recording
-    positive, found = SMALLEST <= accelerometer_noise <= LARGEST, repr(accelerometer_noise)
-    require(positive, "accelerometer_noise", "a positive number", found)
+    if not SMALLEST <= accelerometer_noise <= LARGEST:
+        raise InputError(
+            f"accelerometer_noise: expected a positive number, found {accelerometer_noise!r}"
+        )
     return replace(recording, accelerometer_noise_sd=accelerometer_noise)
 
 
