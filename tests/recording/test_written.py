@@ -75,6 +75,13 @@ def test_packed_tables_are_unpacked_and_damaged_ones_refused(tmp_path, plain, mo
         read_tables([tmp_path / "log.csv"], columns)
 
 
+def test_a_delimiter_may_end_each_line(tmp_path, plain):
+    """Also that of the last one, which no line break follows: nothing is cut off."""
+    found, lines = read(tmp_path, ",\n".join(",".join(row) for row in table(ROWS)) + ",")
+    np.testing.assert_array_equal(found.specific_force, plain.specific_force)
+    assert lines == []
+
+
 def test_a_header_again_and_remarks_among_the_rows_are_left_out(tmp_path, plain):
     """A logger that was started twice, and says how full its battery is."""
     rows = table(ROWS)

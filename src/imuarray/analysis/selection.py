@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from imuarray.errors import require
+from imuarray.errors import InputError, require
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model.structure import design, products
 from imuarray.recording import Recording
@@ -91,7 +91,7 @@ def select_dynamic(recording: Recording) -> Selection:
     if not len(usable):
         each = ", ".join(f"{count} {words}" for words, count in removed.items())
         found = f"none ({each}){_shaken(recording, still, speed)}"
-        require(False, "recording", "moving samples off the rails", found)
+        raise InputError(f"recording: expected moving samples off the rails, found {found}")
     size = information(recording.select(usable))
     keep = size >= np.quantile(size, 1 - INFORMATIVE)
     removed["less informative half"] = int((~keep).sum())

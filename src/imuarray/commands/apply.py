@@ -52,7 +52,7 @@ def apply(arguments, _) -> Answer:
 
 
 def tally(part: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Of samples: the counts of `COUNTED`; by `RAILED`, values and sums of their squared sds."""
+    """Samples by `COUNTED`; values and sums of their squared sds by `RAILED`."""
     lost = np.isnan(part["angular_rate"].to_numpy()).any(axis=1)
     railed = part["gyroscope_at_rail"].to_numpy() & ~lost
     missed = ~part["converged"].to_numpy() & ~lost

@@ -35,7 +35,7 @@ GYROSCOPES = ("calibrate", "offset")
 
 
 class AtRest(NamedTuple):
-    """What still poses say of K triads of a kind, in SI units.
+    """Offsets and noise of K triads of a kind, by still poses, in SI units.
 
     Attributes
     ----------

@@ -259,13 +259,8 @@ def _fit(moves, direction, covariance, turn, before) -> CommonMap:
         change = change + delta.reshape(3, 3)
         # share of each move's variance that the map has left in its error
         rest = total - slopes @ np.linalg.solve(normal, slopes.T)
-        shares = (
-            np.einsum(
-                "nii->n", np.linalg.solve(diagonal_blocks(total, 2), diagonal_blocks(rest, 2))
-            )
-            / 2
-        )
-        free = np.clip(shares, 0.05, 1.0)
+        shares = np.linalg.solve(*(diagonal_blocks(part, 2) for part in (total, rest)))
+        free = np.clip(np.einsum("nii->n", shares) / 2, 0.05, 1.0)
         inflation, size = _weights(errors - slopes @ delta, given, own, size, free)
         if np.abs(delta).max() < SETTINGS.move_close:
             break

@@ -33,10 +33,8 @@ def check_sizes(file: h5py.File, where: str, whole: bool = True) -> None:
         shape = tuple(int(n) for n in getattr(item, "shape", None) or ())
         stays = not whole and name in record.SAMPLED and len(shape) > 1
         room = INFLATED * item.id.get_storage_size() if stays else 0
-        least, expected = math.prod(shape), f"at most {record.MAX_VALUES} values"
-        require(
-            least <= max(record.MAX_VALUES, room), f"{where}: {name}", expected, f"shape {shape}"
-        )
+        small, expected = math.prod(shape) <= max(record.MAX_VALUES, room), record.MAX_VALUES
+        require(small, f"{where}: {name}", f"at most {expected} values", f"shape {shape}")
 
     file.visititems(visit)
 

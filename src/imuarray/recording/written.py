@@ -115,7 +115,8 @@ def rows_of_numbers(table: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
 
 def without_cut(table: pd.DataFrame, path: Path) -> tuple[pd.DataFrame, list[str]]:
     """The table without a last row that ends amid its line, as of a log cut off; a line on it."""
-    if len(table) < 2 or pd.notna(pd.to_numeric(table.iloc[-1, -1], errors="coerce")):
+    whole = table.loc[:, table.columns != ""]  # a delimiter may end each line
+    if len(table) < 2 or pd.notna(pd.to_numeric(whole.iloc[-1, -1], errors="coerce")):
         return table, []
     with opened(path) as file:
         last = deque(file, maxlen=1)[0].rstrip(b"\0")

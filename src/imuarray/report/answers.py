@@ -182,7 +182,7 @@ def extended(diagnosis: Diagnosis) -> Answer:
 
 
 def gained(diagnosis: Diagnosis) -> Answer:
-    """What the extended model gained: prediction, residual, positions and their widths."""
+    """Gains of the extended model: prediction, residual, positions and their widths."""
     document, gain = diagnosis.document, diagnosis.document["gain"]
     samples = document["samples"]
     over_base, over_inflated = (
@@ -260,7 +260,7 @@ def positions_in_words(diagnosis: Diagnosis) -> str:
 
 
 def onward(diagnosis: Diagnosis) -> Answer:
-    """What to do with the diagnosis."""
+    """The next steps after the diagnosis."""
     document, named = diagnosis.document, [c["effect"] for c in diagnosis.document["causes"]]
     items = [f"Mend this first: {reason}" for reason in document.get("reasons", [])[:1]]
     data = [DATA_EFFECTS[name] for name in named if name in DATA_EFFECTS]

@@ -48,7 +48,7 @@ def claim(id: str, *sources: str, **given):
 
 
 class Missing(Exception):
-    """What a claim needs is not here; the argument is the claim's outcome."""
+    """Raised, with the claim's outcome, where a claim needs results that are not here."""
 
 
 def _judged(id, test, sources, given, results) -> Outcome:
