@@ -122,6 +122,28 @@ def test_a_little_colour_of_all_gyroscopes(clean):
     assert all("gyroscope" in name for name in named.parameters)
 
 
+def test_what_the_motion_passes_on_of_one_accelerometers_colour(clean):
+    """Against noise that is passed on, triad by triad; so the colour is named of that one alone."""
+    rng, shape = np.random.default_rng(7), clean.fit.residual.shape
+    triads = np.argwhere(noises.observable(clean.readings, clean.fit.basis))
+    passed = noises.passed_on(clean.fit, triads)
+    for place, (imu, kind) in enumerate(triads[:4]):
+        own, noise = slice(3 * kind, 3 * kind + 3), np.zeros(shape)
+        noise[:, imu, own] = rng.standard_normal((len(noise), 3))
+        made, _ = residual_of(clean, noise)
+        power = [np.mean(noise_effects.triad(made, *other) ** 2) for other in triads]
+        assert power == pytest.approx(passed[:, place], rel=0.2, abs=0.01)
+    noise = rng.standard_normal(shape)
+    for at in range(1, len(noise)):  # of unit variance
+        noise[at, 3, :3] = 0.7 * noise[at - 1, 3, :3] + np.sqrt(1 - 0.7**2) * noise[at, 3, :3]
+    noise[:, 3, :3] *= 2  # and taken for half as large
+    made, judged = residual_of(clean, noise)
+    found = noise_effects.colours(made, judged)
+    z = (found.rho - 0.7 * (triads == [3, 0]).all(axis=1)) * np.sqrt(found.pairs)
+    assert np.abs(z).max() < 4 and found.power[6] == pytest.approx(4, rel=0.2)
+    assert noise_effects.coloured(made, judged, LIMIT, untied=True).imus == (3,)
+
+
 def test_a_spectrum_without_alike_neighbours_is_no_colour(clean):
     """One triad's noise is alike two samples apart: its upper spectrum falls, neighbours differ."""
     noise = np.random.default_rng(6).standard_normal(clean.fit.residual.shape)

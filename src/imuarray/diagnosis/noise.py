@@ -14,7 +14,7 @@ from scipy.ndimage import maximum_filter1d
 from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.linearise import CHUNK, THREADS, leverage_of
-from imuarray.engine.normal import projected_columns
+from imuarray.engine.normal import projected_columns, uncorrelated
 from imuarray.engine.readings import Readings, by_triad, few_at_once
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.tails import QUARTILE, log_normal
@@ -89,14 +89,14 @@ def estimated(readings: Readings, residual, basis) -> Noise:
     scale = np.maximum(np.sqrt(np.nanmean(values**2, axis=-1)), 1e-12)
     far = _outliers(fast, core)
     expected = 2 * np.exp(log_normal(SETTINGS.far)) * counts
-    slope, correlation = _colour(np.nan_to_num(unit), known)
+    slopes, correlation = _colour(np.nan_to_num(unit), known)
     passed = 1 + 2 * sum(value * correlation**lag for lag, value in enumerate(AUTOCORRELATION, 1))
     tails = np.nanmean(values**4, axis=-1) / scale**4 - 3.0
     error = np.sqrt(np.maximum(2 + tails, 1.0) * INFLATION / counts) / 2
     sd = readings.sd * np.where(known, scale / np.sqrt(passed), 1.0)
     # beside readings that fit nothing, a triad may come to have the motion for itself
     sd = np.fmax(sd, SETTINGS.least_noise * readings.declared)
-    return Noise(sd, error, far.sum(axis=0), expected, slope, correlation, far)
+    return Noise(sd, error, far.sum(axis=0), expected, slopes, correlation, far)
 
 
 def _outliers(fast, core) -> np.ndarray:
@@ -110,16 +110,13 @@ def _outliers(fast, core) -> np.ndarray:
 def _colour(unit, known):
     """(slope in sds, AR(1) correlation) from the upper spectrum of each ``known`` triad, (N, 2)."""
     power = np.abs(np.fft.rfft(unit, axis=0)) ** 2
-    part, low, high = _bands(len(unit))
-    bands = [power[band].reshape(band.sum(), -1, 2, 3) for band in (low, high)]
-    means = [np.maximum(b.mean(axis=(0, 3)), 1e-12) for b in bands]
-    ratio = np.log(means[1] / means[0])
-    error = _slope_error(low, high)
-    slope = np.where(known, ratio / error, 0.0)
+    power = power.reshape(len(power), -1, 2, 3).mean(axis=3)
+    found = slope(np.array([power[band].mean(axis=0) for band in _bands(len(unit))[1:]]), len(unit))
     grid = np.linspace(-0.95, 0.98, 194)
-    expected = np.array([_ar_ratio(rho, part[low], part[high]) for rho in grid])
-    correlation = grid[np.argmin(np.abs(expected[:, None, None] - ratio), axis=0)]
-    return slope, np.where(np.abs(slope) > SETTINGS.coloured, correlation, 0.0)
+    expected = slope(band_powers(grid, len(unit)), len(unit))
+    correlation = grid[np.argmin(np.abs(expected[:, None, None] - found), axis=0)]
+    found = np.where(known, found, 0.0)
+    return found, np.where(np.abs(found) > SETTINGS.coloured, correlation, 0.0)
 
 
 def _bands(samples):
@@ -128,21 +125,47 @@ def _bands(samples):
     return part, (part >= SETTINGS.bands[0]) & (part < SETTINGS.bands[1]), part >= SETTINGS.bands[1]
 
 
-def _slope_error(low, high) -> float:
-    """sd of the log ratio of two bands' mean power over a triad's three axes."""
-    return float(np.sqrt(1 / (3 * low.sum()) + 1 / (3 * high.sum())))
+def slope(power, samples: int) -> np.ndarray:
+    """Log ratio of the two bands' mean power (2, ...) over a triad's three axes, in its sds."""
+    _, *bands = _bands(samples)
+    ratio = np.diff(np.log(np.maximum(power, 1e-12)), axis=0)[0]
+    return ratio / np.sqrt(sum(1 / (3 * band.sum()) for band in bands))
 
 
-def expected_ratio(rho: float, samples: int) -> float:
-    """The slope, in its sds, that an AR(1) of this correlation has."""
-    part, low, high = _bands(samples)
-    return _ar_ratio(rho, part[low], part[high]) / _slope_error(low, high)
+def band_powers(rho, samples: int) -> np.ndarray:
+    """Mean power in the two bands (2, n) of AR(1) noises of unit variance, correlations (n,)."""
+    part, *bands = _bands(samples)
+    rho = np.asarray(rho)[:, None]
+    power = (1 - rho**2) / (1 + rho**2 - 2 * rho * np.cos(2 * np.pi * part))
+    return np.array([power[:, band].mean(axis=1) for band in bands])
 
 
-def _ar_ratio(rho, low, high) -> float:
-    """Expected log ratio of the two bands' mean power for an AR(1)."""
-    power = [1 / (1 + rho**2 - 2 * rho * np.cos(2 * np.pi * f)) for f in (low, high)]
-    return float(np.log(power[1].mean() / power[0].mean()))
+def passed_on(fit: Fit, triads) -> np.ndarray:
+    """Share (n, n) of each of ``triads``' noise power, its own included, in each one's residual.
+
+    Its mean over some samples: it changes as slowly as the motion does.
+    """
+    imu, kind = triads.T
+    rows = (6 * imu + 3 * kind)[:, None] + np.arange(3)
+    count = len(fit.residual)
+    at = np.unique(np.linspace(0, count - 1, min(SETTINGS.instants, count)).astype(int))
+    keep = fit.readings.keep.reshape(count, -1)[at]
+    basis = fit.basis[at]
+    left = (np.eye(basis.shape[1]) - basis @ np.swapaxes(basis, 1, 2)) * keep[:, None]
+    every = np.moveaxis(left[:, rows], -1, 0)  # of each reading's noise in the triads' residuals
+    unit = uncorrelated(every, basis[:, rows], np.broadcast_to(keep[:, rows], every.shape))
+    share = np.nanmean(unit[rows.ravel()] ** 2, axis=(1, 3))
+    return 3 * share.reshape(len(rows), 3, -1).mean(axis=1).T
+
+
+def slow_power(fit: Fit, noise: Noise) -> np.ndarray:
+    """Power (N, 2) of triads' residuals at low frequencies in that of white noise of their sd."""
+    out, triads = np.ones(noise.correlation.shape), np.argwhere(observable(fit.readings, fit.basis))
+    rho = np.maximum(noise.correlation, 0.0)
+    if np.any(rho):
+        own = (1 + rho) / (1 - rho)
+        out[tuple(triads.T)] = passed_on(fit, triads) @ own[tuple(triads.T)]
+    return out
 
 
 def coloured_meat(fit: Fit, information, correlation) -> np.ndarray | None:

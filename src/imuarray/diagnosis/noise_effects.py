@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis.fit import Fit
-from imuarray.diagnosis.noise import Noise, expected_ratio, observable
+from imuarray.diagnosis.noise import Noise, band_powers, observable, passed_on, slope
 from imuarray.diagnosis.reading_effects import Finding
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.heldout import blocks_of, summed
@@ -22,9 +22,10 @@ class Colours(NamedTuple):
 
     triads: np.ndarray  # (n, 2) IMU, kind
     rho: np.ndarray  # (n,) of neighbouring samples
-    pairs: np.ndarray  # (n,) of them
+    pairs: np.ndarray  # (n,) of independent ones that would show it as well
     slope: np.ndarray  # (n,) of the spectrum, as `Noise` has it
-    implied: np.ndarray  # (n,) of an AR(1) with this autocorrelation
+    implied: np.ndarray  # (n,) of AR(1) noise with this autocorrelation
+    power: np.ndarray  # (n,) of the noise, in that of the sd in use
 
 
 class Mixture(NamedTuple):
@@ -75,11 +76,18 @@ def autocorrelation(fit: Fit, imu: int, kind: int) -> tuple[float, int]:
 
 
 def colours(fit: Fit, noise: Noise) -> Colours:
-    """Colours of a fit's residual."""
+    """Colours of a fit's residual, without what the common motion passes from triad to triad."""
     known = observable(fit.readings, fit.basis)
-    rho, pairs = np.array([autocorrelation(fit, *pair) for pair in np.argwhere(known)]).T
-    implied = np.array([expected_ratio(value, len(fit.residual)) for value in rho])
-    return Colours(np.argwhere(known), rho, pairs, noise.slope[known], implied)
+    triads = np.argwhere(known)
+    seen, pairs = np.array([autocorrelation(fit, *pair) for pair in triads]).T
+    power = np.array([np.nanmean(triad(fit, *pair) ** 2) for pair in triads])
+    passed, count = passed_on(fit, triads), len(fit.residual)
+    back = np.linalg.pinv(passed, SETTINGS.least_passed)
+    own = np.maximum(back @ power, SETTINGS.least_passed * power)
+    rho = np.clip(back @ (power * seen) / own, -SETTINGS.most_alike, SETTINGS.most_alike)
+    error = np.sqrt(np.sum((back * power / np.sqrt(pairs)) ** 2, axis=1)) / own
+    implied = slope((own * band_powers(rho, count)) @ passed.T, count)
+    return Colours(triads, rho, error**-2, noise.slope[known], implied, own)
 
 
 def whole_scales(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
@@ -271,13 +279,19 @@ def pooled_autocorrelation(found: Colours) -> float:
     kind, logs = found.triads[:, 1], [0.0]
     for chosen in (np.ones(len(kind), bool), kind == 0, kind == 1):
         if chosen.any():
-            rho, pairs, slope, implied = (part[chosen] for part in found[1:])
+            rho, pairs, slope, implied = (part[chosen] for part in found[1:5])
             signed, root = np.sign(rho), np.sqrt(len(rho))
             apart = abs(np.sum(signed * (slope - implied))) / root
             there = -np.sum(signed * slope) / root
             if apart < SETTINGS.agree < there:
                 logs.append(log_chi_square(float(np.sum(rho**2 * pairs)), len(rho)) + np.log(3))
     return min(logs)
+
+
+def alike(found: Colours) -> np.ndarray:
+    """log p (n,) of each triad's lag-one correlation, 0 where its spectrum disagrees."""
+    plain = log_normal(np.abs(found.rho) * np.sqrt(found.pairs)) + np.log(2 * len(found.rho))
+    return np.where(np.abs(found.slope - found.implied) < SETTINGS.agree, plain, 0.0)
 
 
 def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Finding | None:
@@ -287,14 +301,10 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Finding | No
     """
     own = colours(fit, noise)
     triads, size, off = own.triads, np.abs(own.rho), np.abs(own.slope - own.implied)
-    # the common motion passes a little of one triad's autocorrelation on to the others
-    passed = max(SETTINGS.flat, size.max() / 5)
     sharp = log_normal(np.abs(own.slope)) + np.log(2 * len(triads))
-    plain = log_normal(size * np.sqrt(own.pairs)) + np.log(2 * len(triads))
-    log_p = np.minimum(sharp, np.where(untied & (off < SETTINGS.agree), plain, 0.0))
-    marked = noise.correlation[tuple(triads.T)] != 0
+    log_p = np.minimum(sharp, alike(own) if untied else 0.0)
     agree = off < np.maximum(SETTINGS.agree, SETTINGS.agree_share * np.abs(own.implied))
-    far = ((log_p <= limit) | marked) & ((sharp <= limit) | (size >= passed)) & agree
+    far = (log_p <= limit) & ((sharp <= limit) | (size >= SETTINGS.flat)) & agree
     logs = log_p[far]
     together = pooled_autocorrelation(own)
     if not far.any() and together > limit:
@@ -303,7 +313,7 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Finding | No
         rest = (triads[:, 1] == kind) & ~far
         square = float(np.sum(own.rho[rest] ** 2 * own.pairs[rest]))
         pooled = log_chi_square(square, max(rest.sum(), 1))
-        if rest.any() and pooled < SETTINGS.others and np.median(size[rest]) > passed:
+        if rest.any() and pooled < SETTINGS.others and np.median(size[rest]) > SETTINGS.flat:
             far |= rest
     if not far.any():
         return None

@@ -113,8 +113,18 @@ def ended(search: Search, without, tailed) -> tuple[Search, list[Check], list[Fi
     """The search with the colour of its noise, the checks of what is left, causes in the noise."""
     search = fit_coloured_noise(search, without)
     checks = final_checks(search, tailed)
-    untied = all(c.log_p >= SETTINGS.check for c in checks if c.name.startswith("residual"))
+    untied = untied_by(checks)
+    if not untied:  # slow noise looks tied to the motion, too, until it is known to be slow
+        other = fit_coloured_noise(search, without, suspected=True)
+        others = checks if other is search else final_checks(other, tailed)
+        if untied_by(others):
+            search, checks, untied = other, others, True
     return search, checks, named_noise(search, without, tailed, untied)
+
+
+def untied_by(checks: list[Check]) -> bool:
+    """True where no check ties the residual to the motion."""
+    return all(c.log_p >= SETTINGS.check for c in checks if c.name.startswith("residual"))
 
 
 def prepared(recording: Recording, without):
@@ -196,8 +206,11 @@ def fit_heavy_tails(search: Search, without) -> tuple[Search, list, list]:
     return search, tailed, [named]
 
 
-def fit_coloured_noise(search: Search, without) -> Search:
-    """Where the spectrum shows coloured noise, take its size and correlation from all of it."""
+def fit_coloured_noise(search: Search, without, suspected=False) -> Search:
+    """Where the spectrum shows coloured noise, take its size and correlation from all of it.
+
+    Or, if it is ``suspected``, where neighbours are alike and the spectrum does not contradict it.
+    """
     if COLOURED in without:
         return search
     made = beside_left(search)[0]
@@ -205,12 +218,14 @@ def fit_coloured_noise(search: Search, without) -> Search:
     coloured = search.noise.correlation[tuple(found.triads.T)] != 0
     if noise_effects.pooled_autocorrelation(found) < SETTINGS.limit(COLOURED):
         coloured |= np.abs(found.rho) * np.sqrt(found.pairs) > SETTINGS.clear
+    if suspected:
+        coloured |= noise_effects.alike(found) < SETTINGS.limit(COLOURED)
     if not coloured.any():
         return search
     correlation, sd = search.noise.correlation.copy(), search.readings.sd.copy()
-    for (imu, kind), rho in zip(found.triads[coloured], found.rho[coloured], strict=True):
-        correlation[imu, kind] = rho
-        sd[imu, kind] *= np.sqrt(np.nanmean(noise_effects.triad(made, imu, kind) ** 2))
+    own = tuple(found.triads[coloured].T)
+    correlation[own] = found.rho[coloured]
+    sd[own] *= np.sqrt(found.power[coloured])
     readings = search.readings.with_sd(sd)
     made = fit(readings, search.columns, search.active, search.fit.state, search.smooth)
     noise = search.noise._replace(correlation=correlation, sd=sd)

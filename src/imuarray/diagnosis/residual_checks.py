@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from imuarray.diagnosis.fit import Fit, delay_score
-from imuarray.diagnosis.noise import Noise, observable, standardised
+from imuarray.diagnosis.noise import Noise, observable, slow_power, standardised
 from imuarray.diagnosis.reading_effects import triads
 from imuarray.diagnosis.replicates import motion_sizes
 from imuarray.diagnosis.scores import Information
@@ -88,6 +88,7 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
     motion, (samples, count) = fit.state.motion, fit.residual.shape[:2]
     basis = fit.basis.reshape(samples, count, 6, -1)
     groups: dict[str, list] = {}
+    slow = slow_power(fit, noise)  # as features are: coloured noise is largest there
     axes = []
     for imu in range(count):
         common = features(fit, imu)
@@ -108,9 +109,7 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
             cross = stacked.T @ seen
             block = stacked.T @ (free[:, None] * stacked) - cross @ inner @ cross.T
             plain = np.diag(stacked.T @ (kept[:, None] * stacked))
-            # slow regressors see coloured noise larger than its sd, at most by this
-            rho = max(noise.correlation[imu, axis // 3], 0.0)
-            block = block * ((1 + rho) / (1 - rho))
+            block = block * slow[imu, axis // 3]
             for name in table:
                 chosen = np.flatnonzero(names == name)
                 groups.setdefault(name, []).append((imu, *_chi(block, score, plain, chosen)))

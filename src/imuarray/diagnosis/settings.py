@@ -68,6 +68,9 @@ class Settings:
     least_noise: float = 1e-3  # of the declared sd
     far: float = 4.0  # sds of a difference; beyond is an outlier's
     flat: float = 0.02  # autocorrelation too small to speak of
+    most_alike: float = 0.98  # autocorrelation beyond which noise is a drift
+    instants: int = 64  # at which is looked what the motion passes on from triad to triad
+    least_passed: float = 0.1  # share of a triad's noise power that its residual must have
     bands: tuple[float, float] = (0.2, 0.35)  # of the sampling rate, where the two bands begin
     coloured: float = 4.5  # sds of the spectrum's slope from which noise is not white
     few: int = 4  # outliers; so few are an accident, not a law

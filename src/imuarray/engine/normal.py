@@ -84,7 +84,7 @@ def uncorrelated(residual, basis, keep) -> np.ndarray:
             known += np.einsum("...d,...d->...", basis[..., i, :], basis[..., j, :])
             factor[..., i, j] = np.where(free[..., j], -known / factor[..., j, j], 0.0)
         own = 1.0 - np.einsum("...d,...d->...", basis[..., i, :], basis[..., i, :])
-        own -= np.sum(factor[..., i, :i] ** 2, axis=-1)
+        own = own - np.sum(factor[..., i, :i] ** 2, axis=-1)
         clear = free[..., i] = own > SETTINGS.least_free
         factor[..., i, i] = np.sqrt(np.where(clear, own, SETTINGS.least_free))
         absorbed = np.sum(factor[..., i, :i] * out[..., :i], axis=-1)
