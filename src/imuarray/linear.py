@@ -81,11 +81,11 @@ def triangular_inverse(factor) -> np.ndarray:
     return out
 
 
-def matrix_function(matrix, vector, function, tolerance: float = 1e-13) -> np.ndarray:
-    """function(matrix) @ vector (n,) of a symmetric matrix (n, n), by Lanczos' method.
+def matrix_function(product, vector, function, tolerance: float = 1e-13) -> np.ndarray:
+    """function(M) @ vector (n,) of a symmetric M (n, n), by Lanczos' method.
 
-    ``function`` takes eigenvalues (k,). Some twenty products with the matrix instead of all its
-    eigenvectors: ends where more would add no more than the ``tolerance`` of it.
+    ``product``: M @ v (n,) of a v (n,). ``function`` takes eigenvalues (k,). Some twenty products
+    instead of all eigenvectors: ends where more would add no more than the ``tolerance`` of it.
     """
     size, count = float(np.linalg.norm(vector)), len(vector)
     if size == 0.0:
@@ -94,7 +94,7 @@ def matrix_function(matrix, vector, function, tolerance: float = 1e-13) -> np.nd
     basis[0] = vector / size
     while True:
         k = len(diagonal)
-        after, known = matrix @ basis[k], basis[: k + 1]
+        after, known = product(basis[k]), basis[: k + 1]
         diagonal.append(basis[k] @ after)
         for _ in range(2):  # once leaves rounding of what was taken out
             after -= known.T @ (known @ after)

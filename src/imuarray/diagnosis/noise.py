@@ -182,23 +182,22 @@ def coloured_meat(fit: Fit, information, correlation) -> np.ndarray | None:
 
 def _with_former(fit: Fit, correlation, triads) -> np.ndarray:
     """Covariance (K, K) of some triads' scores with those of all samples before."""
-    from scipy.signal import lfilter  # slow to import, and seldom needed
-
     mask = fit.described[:, fit.wanted]
     size = int(mask.sum())
-    half, states = np.zeros((size, size)), np.zeros((len(triads), 1, 3, size))
+    half, states = np.zeros((size, size)), np.zeros((len(triads), 3, size))
     for start in range(0, len(fit.residual), CHUNK):
         part = slice(start, start + CHUNK)
         projected, blocks = projected_columns(fit.whitened[part], fit.basis[part], mask)
-        for number, (imu, kind) in enumerate(triads):
+        for state, (imu, kind) in zip(states, triads, strict=True):
             axes, rho = slice(3 * kind, 3 * kind + 3), correlation[imu, kind]
             # derivatives of the triad's readings, the motion's share taken out
             seen = -fit.basis[part, 6 * imu : 6 * imu + 6][:, axes] @ projected
             for _, places, block in (item for item in blocks if item[0] == imu):
                 seen[..., places] += block[:, axes]
-            # the sum over samples before of rho^lag times theirs
-            before, states[number] = lfilter(
-                [0.0, rho], [1.0, -rho], seen, axis=0, zi=states[number]
-            )
+            before = np.empty_like(seen)  # the sum over samples before of rho^lag times theirs
+            for now, earlier in zip(seen, before, strict=True):
+                earlier[:] = state
+                state += now
+                state *= rho
             half += seen.reshape(-1, size).T @ before.reshape(-1, size)
     return half

@@ -7,6 +7,7 @@ Effects that a recording has of its own (biases, clocks) have parameters in each
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -141,9 +142,13 @@ def jackknifed(information, precision, blocks) -> np.ndarray:
     inverse = back.T @ back
     variance = np.maximum(np.sum((inverse @ precision) * inverse, axis=1), 0.0)
     for inner, score in blocks:
-        share, forth = back @ inner @ back.T, back @ score
-        variance += (back.T @ matrix_function(share, forth, _spared)) ** 2
+        share = partial(_between, back, inner)
+        variance += (back.T @ matrix_function(share, back @ score, _spared)) ** 2
     return np.sqrt(variance)
+
+
+def _between(back, inner, vector) -> np.ndarray:
+    return back @ (inner @ (vector @ back))
 
 
 def _spared(share) -> np.ndarray:

@@ -23,6 +23,7 @@ from imuarray.engine.settings import SETTINGS
 from imuarray.model.timing import clock_turns
 
 UNIT = 1e-3  # s, of the ages until their size is known
+FEW = 10  # trials at a time, which a cache holds
 
 
 class Gyroscopes(NamedTuple):
@@ -217,12 +218,22 @@ def _costs(residual, turn, turns, most, period, along, trials, taken, together) 
     common to all is the motion's then, else ``taken`` (T,) is.
     """
     found = np.zeros(len(trials))
-    for k in range(turns.shape[1]):
-        shift = trials @ along.T
-        place = turns[:, k] + shift
-        age = period[k] * (place - np.floor(place) - 0.5 - (shift if together else taken))
-        off = sum(np.abs(residual[:, k, i] + age * turn[:, k, i]) for i in range(3))
-        found += np.minimum(off, most[:, k]).sum(axis=1)
+    for start in range(0, len(trials), FEW):  # that stay in the cache
+        some = slice(start, start + FEW)
+        shift = trials[some] @ along.T
+        gone = shift if together else taken
+        for k in range(turns.shape[1]):
+            age = turns[:, k] + shift
+            age -= np.floor(age)
+            age -= 0.5
+            age -= gone
+            age *= period[k]
+            off, one = np.zeros_like(age), np.empty_like(age)
+            for i in range(3):
+                np.multiply(age, turn[:, k, i], out=one)
+                one += residual[:, k, i]
+                off += np.abs(one, out=one)
+            found[some] += np.minimum(off, most[:, k], out=off).sum(axis=1)
     return found
 
 
