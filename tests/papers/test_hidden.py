@@ -83,9 +83,13 @@ def wrong(truth, document) -> str:
     rare = hidden["effect"] in DATA_EFFECTS and DATA_EFFECTS[hidden["effect"]].left_out
     if cause["heldout_gain_nats"] < (1e-9 if rare else 1.5 * cause["heldout_gain_se"]):
         return f"{hidden['effect']}: gains no more than its error on held-out time"
-    items = [item for item in cause["parameters"].values() if item["sd"]]  # a scan fixes others
+    # a scan fixes others; a time follows from its correlation
+    items = [item for name, item in cause["parameters"].items()
+             if item["sd"] and not name.startswith("correlation_time")]  # fmt: skip
     true = next((np.ravel(p["value"]) for p in hidden["parameters"].values()
                  if np.size(p["value"]) == len(items)), None)  # fmt: skip
+    if hidden["effect"] == "coloured_noise":  # the same of both kinds
+        true = np.full(len(items), hidden["parameters"]["coefficient"]["value"])
     if cause["effect"] != hidden["effect"] or true is None:
         return ""
     z = [(item["value"] - value) / item["sd"] for item, value in zip(items, true, strict=True)]
