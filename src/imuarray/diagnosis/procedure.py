@@ -114,7 +114,8 @@ def ended(search: Search, without, tailed) -> tuple[Search, list[Check], list[Fi
     search = fit_coloured_noise(search, without)
     checks = final_checks(search, tailed)
     untied = untied_by(checks)
-    if not untied:  # slow noise looks tied to the motion, too, until it is known to be slow
+    # slow noise looks tied to the motion, too, until it is known to be slow
+    if search.smooth and not untied:
         other = fit_coloured_noise(search, without, suspected=True)
         others = checks if other is search else final_checks(other, tailed)
         if untied_by(others):
