@@ -79,10 +79,10 @@ def run_procedure(
     search = adopt(search, first).light()
     notify("fitting to the end")
     search = eliminate(search.refit(rough=False))
-    search, faults = leave_out_clips(search, faults, without)
     notify("judging the noise")
     search = search.light()
-    search = with_outliers(search)
+    search = with_outliers(search)  # among which a clipped reading may be
+    search, faults = leave_out_clips(search, faults, without)
     shock, used = unshaken(search, without)
     if not used.all():
         raw = raw.select(used)
