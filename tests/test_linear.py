@@ -62,6 +62,7 @@ def test_a_function_of_a_matrix_is_that_of_its_eigenvalues(count, largest):
     found = matrix_function(((axes * values) @ axes.T).__matmul__, vector, function)
     np.testing.assert_allclose(found, axes @ (function(values) * (axes.T @ vector)), rtol=1e-9)
     assert np.all(matrix_function(np.copy, np.zeros(count), function) == 0.0)
+    assert matrix_function(lambda v: v, np.ones(count), function) == pytest.approx(function(1.0))
 
 
 @pytest.mark.parametrize("size", [0, 1, 9, 24])

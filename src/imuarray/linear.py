@@ -97,7 +97,7 @@ def matrix_function(product, vector, function, tolerance: float = 1e-13) -> np.n
         after, known = product(basis[k]), basis[: k + 1]
         diagonal.append(basis[k] @ after)
         for _ in range(2):  # once leaves rounding of what was taken out
-            after -= known.T @ (known @ after)
+            after = after - known.T @ (known @ after)
         norm = float(np.linalg.norm(after))
         last = k + 1 == count or norm <= tolerance * max(np.abs(diagonal))
         if last or k % CHECKED == CHECKED - 1:

@@ -1,6 +1,7 @@
 """What all IMUs have a little of: seen together, and not as one's; and the other way round."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -122,26 +123,80 @@ def test_a_little_colour_of_all_gyroscopes(clean):
     assert all("gyroscope" in name for name in named.parameters)
 
 
-def test_what_the_motion_passes_on_of_one_accelerometers_colour(clean):
-    """Against noise that is passed on, triad by triad; so the colour is named of that one alone."""
-    rng, shape = np.random.default_rng(7), clean.fit.residual.shape
-    triads = np.argwhere(noises.observable(clean.readings, clean.fit.basis))
-    passed = noises.passed_on(clean.fit, triads)
-    for place, (imu, kind) in enumerate(triads[:4]):
-        own, noise = slice(3 * kind, 3 * kind + 3), np.zeros(shape)
-        noise[:, imu, own] = rng.standard_normal((len(noise), 3))
-        made, _ = residual_of(clean, noise)
-        power = [np.mean(noise_effects.triad(made, *other) ** 2) for other in triads]
-        assert power == pytest.approx(passed[:, place], rel=0.2, abs=0.01)
-    noise = rng.standard_normal(shape)
-    for at in range(1, len(noise)):  # of unit variance
-        noise[at, 3, :3] = 0.7 * noise[at - 1, 3, :3] + np.sqrt(1 - 0.7**2) * noise[at, 3, :3]
-    noise[:, 3, :3] *= 2  # and taken for half as large
+def ar(rng, rho, shape):
+    """AR(1) noise of unit variance along the first axis."""
+    out = rng.standard_normal(shape)
+    for at in range(1, len(out)):
+        out[at] = rho * out[at - 1] + np.sqrt(1 - rho**2) * out[at]
+    return out
+
+
+@pytest.mark.parametrize("rho", [0.6, 0.9, -0.6])
+def test_one_accelerometers_colour_is_not_that_of_others(clean, rho):
+    """Taken for half as loud as it is; the motion passes it on to the other accelerometers."""
+    rng = np.random.default_rng(7)
+    noise = rng.standard_normal(clean.fit.residual.shape)
+    noise[:, 3, :3] = 2 * ar(rng, rho, noise[:, 3, :3].shape)
     made, judged = residual_of(clean, noise)
     found = noise_effects.colours(made, judged)
-    z = (found.rho - 0.7 * (triads == [3, 0]).all(axis=1)) * np.sqrt(found.pairs)
-    assert np.abs(z).max() < 4 and found.power[6] == pytest.approx(4, rel=0.2)
-    assert noise_effects.coloured(made, judged, LIMIT, untied=True).imus == (3,)
+    z = (found.rho - rho * (found.triads == [3, 0]).all(axis=1)) * np.sqrt(found.pairs)
+    assert np.abs(z).max() < 4.5
+    assert found.power[6] == pytest.approx(4, rel=0.3)
+    named = noise_effects.coloured(made, judged, LIMIT, untied=True)
+    assert named.imus == (3,) and named.gain > 5 * named.gain_se
+
+
+def passing(rng, sds, samples, missing=0):
+    """A fit of gyroscopes alone (their motion is one rate), with noise of the sds taken for one."""
+    count = len(sds)
+    basis = np.zeros((samples, 6 * count, 3))
+    weight = 1 / np.asarray(sds)
+    for imu in range(count):
+        basis[:, 6 * imu + 3 : 6 * imu + 6] = weight[imu] * np.eye(3) / np.linalg.norm(weight)
+    keep = np.ones((samples, count, 6), bool)
+    if missing:
+        keep[::missing, 0, 3:] = False
+    exists = np.tile([False, True], (count, 1))
+    readings = SimpleNamespace(keep=keep, run=np.zeros(samples), exists=exists)
+
+    def left(noise):
+        flat = noise.reshape(samples, -1, 1)
+        flat = flat - basis @ (np.swapaxes(basis, 1, 2) @ flat)
+        return SimpleNamespace(readings=readings, basis=basis, residual=flat.reshape(noise.shape))
+
+    return left(rng.standard_normal((samples, count, 6))), left
+
+
+def test_shares_of_noise_that_the_motion_passes_on():
+    """Against noise of one gyroscope after the other; the best one's goes to all others."""
+    rng = np.random.default_rng(8)
+    white, left = passing(rng, [1, 2, 2, 3], 4000)
+    triads = np.argwhere(white.readings.exists)
+    share, alike = noises.passed_on(white, triads)
+    for place, (imu, _) in enumerate(triads):
+        noise = np.zeros((4000, 4, 6))
+        noise[:, imu, 3:] = rng.standard_normal((4000, 3))
+        power = [np.mean(noise_effects.triad(left(noise), *other) ** 2) for other in triads]
+        assert power == pytest.approx(share[:, place], rel=0.1)
+    assert np.abs(share - share.T).max() > 0.1  # which is which matters
+    ends = [noise_effects.triad(white, *pair) for pair in triads]
+    products = np.array([(x[1:] * x[:-1]).sum(axis=1) for x in ends])
+    assert np.corrcoef(products) == pytest.approx(alike, abs=0.06)
+
+
+@pytest.mark.parametrize("sds", [(1, 1), (1, 3, 3, 3), (1, 10, 10)])
+def test_white_noise_has_no_colour_however_few_show_it(sds):
+    """Two gyroscopes' residuals are one and the same; of one far better than the others is none."""
+    rng, far, powers = np.random.default_rng(9), 0, []
+    for _ in range(40):
+        white, _ = passing(rng, sds, 300, missing=13)
+        judged = SimpleNamespace(slope=np.zeros((len(sds), 2)))
+        found = noise_effects.colours(white, judged)
+        far += found.pooled(np.ones(len(found.rho), bool)) < np.log(0.05)
+        assert np.all(found.pairs <= 900) and np.all(np.isfinite(found.rho))
+        powers.append(found.power)
+    assert far < 8  # of two that are expected
+    assert np.mean(powers, axis=0) == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_spectrum_without_alike_neighbours_is_no_colour(clean):

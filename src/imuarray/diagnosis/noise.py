@@ -140,22 +140,31 @@ def band_powers(rho, samples: int) -> np.ndarray:
     return np.array([power[:, band].mean(axis=1) for band in bands])
 
 
-def passed_on(fit: Fit, triads) -> np.ndarray:
-    """Share (n, n) of each of ``triads``' noise power, its own included, in each one's residual.
+def passed_on(fit: Fit, triads) -> tuple[np.ndarray, np.ndarray]:
+    """(share, alike), each (n, n): what the motion passes on between ``triads`` (n, 2).
 
-    Its mean over some samples: it changes as slowly as the motion does.
+    The share of each triad's noise power (columns), its own included, in each one's residual
+    (rows); and how much products of neighbouring residuals are correlated between triads. Means
+    over some samples: they change as slowly as the motion does.
     """
     imu, kind = triads.T
     rows = (6 * imu + 3 * kind)[:, None] + np.arange(3)
-    count = len(fit.residual)
-    at = np.unique(np.linspace(0, count - 1, min(SETTINGS.instants, count)).astype(int))
+    count, number = len(fit.residual), np.arange(SETTINGS.instants)
+    # spread evenly, but at no even steps: readings may be missing at such
+    at = np.unique((count * np.mod(number * (np.sqrt(5) - 1) / 2, 1)).astype(int))
     keep = fit.readings.keep.reshape(count, -1)[at]
     basis = fit.basis[at]
     left = (np.eye(basis.shape[1]) - basis @ np.swapaxes(basis, 1, 2)) * keep[:, None]
     every = np.moveaxis(left[:, rows], -1, 0)  # of each reading's noise in the triads' residuals
     unit = uncorrelated(every, basis[:, rows], np.broadcast_to(keep[:, rows], every.shape))
-    share = np.nanmean(unit[rows.ravel()] ** 2, axis=(1, 3))
-    return 3 * share.reshape(len(rows), 3, -1).mean(axis=1).T
+    seen = np.isfinite(unit[0]).sum(axis=(0, 2))
+    unit = np.nan_to_num(unit)
+    share = np.sum(unit[rows.ravel()] ** 2, axis=(1, 3)).reshape(len(rows), 3, -1).sum(axis=1)
+    flat = np.moveaxis(unit, 0, -1).reshape(len(at), rows.size, -1)
+    squares = np.sum((flat @ np.swapaxes(flat, 1, 2)) ** 2, axis=0)
+    squares = squares.reshape(len(rows), 3, len(rows), 3).sum(axis=(1, 3))
+    size = np.sqrt(np.maximum(np.diag(squares), 1e-12))
+    return (share / np.maximum(seen, 1)).T, squares / np.outer(size, size)
 
 
 def slow_power(fit: Fit, noise: Noise) -> np.ndarray:
@@ -163,8 +172,8 @@ def slow_power(fit: Fit, noise: Noise) -> np.ndarray:
     out, triads = np.ones(noise.correlation.shape), np.argwhere(observable(fit.readings, fit.basis))
     rho = np.maximum(noise.correlation, 0.0)
     if np.any(rho):
-        own = (1 + rho) / (1 - rho)
-        out[tuple(triads.T)] = passed_on(fit, triads) @ own[tuple(triads.T)]
+        more = 2 * rho / (1 - rho)
+        out[tuple(triads.T)] += passed_on(fit, triads)[0] @ more[tuple(triads.T)]
     return out
 
 

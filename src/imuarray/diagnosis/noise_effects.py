@@ -21,11 +21,25 @@ class Colours(NamedTuple):
     """Autocorrelation of the n triads that show their noise."""
 
     triads: np.ndarray  # (n, 2) IMU, kind
-    rho: np.ndarray  # (n,) of neighbouring samples
+    seen: np.ndarray  # (n,) of the residual's neighbouring samples
+    rho: np.ndarray  # (n,) of the noise's own, without what the motion passes on of others'
     pairs: np.ndarray  # (n,) of independent ones that would show it as well
+    alike: np.ndarray  # (n, n) correlation of their errors
     slope: np.ndarray  # (n,) of the spectrum, as `Noise` has it
-    implied: np.ndarray  # (n,) of AR(1) noise with this autocorrelation
+    implied: np.ndarray  # (n,) of the residual's, where all triads have AR(1) noise
     power: np.ndarray  # (n,) of the noise, in that of the sd in use
+
+    @property
+    def square(self) -> np.ndarray:
+        """(n,) of the correlations in their sds."""
+        return self.rho**2 * self.pairs
+
+    def pooled(self, chosen) -> float:
+        """log p of the ``chosen`` (n,) bool correlations together."""
+        number = max(int(chosen.sum()), 1)
+        alike = max(np.sum(self.alike[np.ix_(chosen, chosen)] ** 2) / number, 1.0)
+        total = float(np.sum(self.square[chosen]))
+        return log_chi_square(max(total / alike, 1e-9), number / alike)  # Satterthwaite's
 
 
 class Mixture(NamedTuple):
@@ -76,18 +90,30 @@ def autocorrelation(fit: Fit, imu: int, kind: int) -> tuple[float, int]:
 
 
 def colours(fit: Fit, noise: Noise) -> Colours:
-    """Colours of a fit's residual, without what the common motion passes from triad to triad."""
+    """Colours of a fit's residual, without what the common motion passes from triad to triad.
+
+    A triad that the others hardly check shows no colour.
+    """
     known = observable(fit.readings, fit.basis)
     triads = np.argwhere(known)
     seen, pairs = np.array([autocorrelation(fit, *pair) for pair in triads]).T
     power = np.array([np.nanmean(triad(fit, *pair) ** 2) for pair in triads])
-    passed, count = passed_on(fit, triads), len(fit.residual)
+    seen, power = np.where(pairs > 0, seen, 0.0), np.where(pairs > 0, power, 1.0)
+    (passed, alike), count = passed_on(fit, triads), len(fit.residual)
     back = np.linalg.pinv(passed, SETTINGS.least_passed)
-    own = np.maximum(back @ power, SETTINGS.least_passed * power)
-    rho = np.clip(back @ (power * seen) / own, -SETTINGS.most_alike, SETTINGS.most_alike)
-    error = np.sqrt(np.sum((back * power / np.sqrt(pairs)) ** 2, axis=1)) / own
+    told = (np.diag(back @ passed) > SETTINGS.told) & (pairs > 0)
+    own = np.maximum(1 + back @ (power - 1), SETTINGS.least_passed * power)
+    own = np.where(told, own, power)
+    rho = np.where(told, back @ (power * seen) / own, 0.0)
+    rho = np.clip(rho, -SETTINGS.most_alike, SETTINGS.most_alike)
+    spread = back * power / np.sqrt(np.maximum(pairs, 1)) / own[:, None]
+    covariance = spread @ alike @ spread.T
+    error = np.sqrt(np.maximum(np.diag(covariance), 1e-12))
     implied = slope((own * band_powers(rho, count)) @ passed.T, count)
-    return Colours(triads, rho, error**-2, noise.slope[known], implied, own)
+    return Colours(
+        triads, seen, rho, np.where(told, np.minimum(error**-2, pairs), 0.0),
+        covariance / np.outer(error, error), noise.slope[known], implied, own,
+    )  # fmt: skip
 
 
 def whole_scales(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
@@ -279,18 +305,17 @@ def pooled_autocorrelation(found: Colours) -> float:
     kind, logs = found.triads[:, 1], [0.0]
     for chosen in (np.ones(len(kind), bool), kind == 0, kind == 1):
         if chosen.any():
-            rho, pairs, slope, implied = (part[chosen] for part in found[1:5])
-            signed, root = np.sign(rho), np.sqrt(len(rho))
-            apart = abs(np.sum(signed * (slope - implied))) / root
-            there = -np.sum(signed * slope) / root
+            signed, root = np.sign(found.rho[chosen]), np.sqrt(chosen.sum())
+            apart = abs(np.sum(signed * (found.slope - found.implied)[chosen])) / root
+            there = -np.sum(signed * found.slope[chosen]) / root
             if apart < SETTINGS.agree < there:
-                logs.append(log_chi_square(float(np.sum(rho**2 * pairs)), len(rho)) + np.log(3))
+                logs.append(found.pooled(chosen) + np.log(3))
     return min(logs)
 
 
-def alike(found: Colours) -> np.ndarray:
+def neighbours_alike(found: Colours) -> np.ndarray:
     """log p (n,) of each triad's lag-one correlation, 0 where its spectrum disagrees."""
-    plain = log_normal(np.abs(found.rho) * np.sqrt(found.pairs)) + np.log(2 * len(found.rho))
+    plain = log_normal(np.sqrt(found.square)) + np.log(2 * len(found.rho))
     return np.where(np.abs(found.slope - found.implied) < SETTINGS.agree, plain, 0.0)
 
 
@@ -302,23 +327,23 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Finding | No
     own = colours(fit, noise)
     triads, size, off = own.triads, np.abs(own.rho), np.abs(own.slope - own.implied)
     sharp = log_normal(np.abs(own.slope)) + np.log(2 * len(triads))
-    log_p = np.minimum(sharp, alike(own) if untied else 0.0)
+    log_p = np.minimum(sharp, neighbours_alike(own) if untied else 0.0)
     agree = off < np.maximum(SETTINGS.agree, SETTINGS.agree_share * np.abs(own.implied))
-    far = (log_p <= limit) & ((sharp <= limit) | (size >= SETTINGS.flat)) & agree
+    clear = (size > SETTINGS.flat) & (own.square > SETTINGS.clear**2)  # its own, not passed on
+    far = (log_p <= limit) & clear & agree
     logs = log_p[far]
     together = pooled_autocorrelation(own)
     if not far.any() and together > limit:
         return None
     for kind in set(triads[far, 1]) or range(len(KINDS)):
         rest = (triads[:, 1] == kind) & ~far
-        square = float(np.sum(own.rho[rest] ** 2 * own.pairs[rest]))
-        pooled = log_chi_square(square, max(rest.sum(), 1))
-        if rest.any() and pooled < SETTINGS.others and np.median(size[rest]) > SETTINGS.flat:
+        if rest.any() and own.pooled(rest) < SETTINGS.others and np.median(own.square[rest]) > 2:
             far |= rest
     if not far.any():
         return None
     nats, numbers, step = np.zeros(len(fit.residual)), {}, np.median(np.diff(fit.readings.time))
-    for (imu, kind), rho, pairs in zip(triads[far], own.rho[far], own.pairs[far], strict=True):
+    each = (part[far] for part in (triads, own.seen, own.rho, np.maximum(own.pairs, 1)))
+    for (imu, kind), seen, rho, pairs in zip(*each, strict=True):
         name = f"{KINDS[kind]}_{fit.readings.labels[imu]}"
         error = float(np.sqrt((1 - rho**2) / pairs))
         numbers[f"correlation_{name}"] = (float(rho), error, "1")
@@ -328,8 +353,8 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Finding | No
             numbers[f"correlation_time_{name}"] = (float(late), float(took), "s")
         unit = np.nan_to_num(triad(fit, imu, kind))
         unit = unit / max(unit.std(), 1e-9)
-        jump = (unit[1:] - rho * unit[:-1]) ** 2 / (1 - rho**2)
-        nats[1:] += np.sum(unit[1:] ** 2 - jump - np.log1p(-(rho**2)), axis=1) / 2
+        jump = (unit[1:] - seen * unit[:-1]) ** 2 / (1 - seen**2)
+        nats[1:] += np.sum(unit[1:] ** 2 - jump - np.log1p(-(seen**2)), axis=1) / 2
     imus = tuple(sorted({int(imu) for imu in triads[far, 0]}))
     best = float(min(*logs, together, 0.0))
     return Finding(COLOURED, imus, best, numbers, *held_out(nats))

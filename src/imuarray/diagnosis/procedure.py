@@ -79,6 +79,7 @@ def run_procedure(
     search = adopt(search, first).light()
     notify("fitting to the end")
     search = eliminate(search.refit(rough=False))
+    search, faults = leave_out_clips(search, faults, without)
     notify("judging the noise")
     search = search.light()
     search = with_outliers(search)  # among which a clipped reading may be
@@ -96,8 +97,7 @@ def run_procedure(
     if fewer is not found:
         found, checks, named = ended(fewer, without, tailed)
     search, in_noise = found, [*in_noise, *shock, *named]
-    # a shock is in little of the held-out time
-    in_noise = [x for x in in_noise if x.effect == SHOCK or x.gain > SETTINGS.least_z * x.gain_se]
+    in_noise = list(filter(gains, in_noise))
     explained, failing = within_tolerance(search, checks, in_noise)
     beside = len(in_noise) + len(search.causes) > 1
     in_noise = [x for x in in_noise if x.log_p <= SETTINGS.limit(x.effect, beside)]
@@ -114,13 +114,21 @@ def ended(search: Search, without, tailed) -> tuple[Search, list[Check], list[Fi
     search = fit_coloured_noise(search, without)
     checks = final_checks(search, tailed)
     untied = untied_by(checks)
+    named = named_noise(search, without, tailed, untied)
     # slow noise looks tied to the motion, too, until it is known to be slow
-    if search.smooth and not untied:
+    if search.smooth and not untied and COLOURED not in without:
         other = fit_coloured_noise(search, without, suspected=True)
         others = checks if other is search else final_checks(other, tailed)
-        if untied_by(others):
-            search, checks, untied = other, others, True
-    return search, checks, named_noise(search, without, tailed, untied)
+        found = named_noise(other, without, tailed, True) if untied_by(others) else []
+        limit = SETTINGS.limit(COLOURED, search.causes)
+        if any(x.effect == COLOURED and x.log_p <= limit and gains(x) for x in found):
+            return other, others, found
+    return search, checks, named
+
+
+def gains(item: Finding) -> bool:
+    """True of a clear gain on held-out time; a shock is in little of it."""
+    return item.effect == SHOCK or item.gain > SETTINGS.least_z * item.gain_se
 
 
 def untied_by(checks: list[Check]) -> bool:
@@ -218,9 +226,9 @@ def fit_coloured_noise(search: Search, without, suspected=False) -> Search:
     found = noise_effects.colours(made, search.noise)
     coloured = search.noise.correlation[tuple(found.triads.T)] != 0
     if noise_effects.pooled_autocorrelation(found) < SETTINGS.limit(COLOURED):
-        coloured |= np.abs(found.rho) * np.sqrt(found.pairs) > SETTINGS.clear
+        coloured |= found.square > SETTINGS.clear**2
     if suspected:
-        coloured |= noise_effects.alike(found) < SETTINGS.limit(COLOURED)
+        coloured |= noise_effects.neighbours_alike(found) < SETTINGS.limit(COLOURED)
     if not coloured.any():
         return search
     correlation, sd = search.noise.correlation.copy(), search.readings.sd.copy()

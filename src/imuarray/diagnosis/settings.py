@@ -70,7 +70,8 @@ class Settings:
     flat: float = 0.02  # autocorrelation too small to speak of
     most_alike: float = 0.98  # autocorrelation beyond which noise is a drift
     instants: int = 64  # at which is looked what the motion passes on from triad to triad
-    least_passed: float = 0.1  # share of a triad's noise power that its residual must have
+    least_passed: float = 0.1  # of the largest such share, below which combinations are not told
+    told: float = 0.5  # of a triad's noise that must be its own, once what is passed on is undone
     bands: tuple[float, float] = (0.2, 0.35)  # of the sampling rate, where the two bands begin
     coloured: float = 4.5  # sds of the spectrum's slope from which noise is not white
     few: int = 4  # outliers; so few are an accident, not a law

@@ -142,8 +142,8 @@ def jackknifed(information, precision, blocks) -> np.ndarray:
     inverse = back.T @ back
     variance = np.maximum(np.sum((inverse @ precision) * inverse, axis=1), 0.0)
     for inner, score in blocks:
-        share = partial(_between, back, inner)
-        variance += (back.T @ matrix_function(share, back @ score, _spared)) ** 2
+        product = partial(_between, back, inner)
+        variance += (back.T @ matrix_function(product, back @ score, _spared)) ** 2
     return np.sqrt(variance)
 
 
