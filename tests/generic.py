@@ -36,9 +36,8 @@ def _estimate(model, steps, parameters, given: Unknown, draws):
         def flat(x):
             return residuals(x, data)
 
-        x, factor = generic._mode(flat, x, steps)
-        whole = solve_lower(factor, jnp.eye(x.size)[:, :3])
-        scale = cholesky(whole.T @ whole)  # covariance of omega: the inverse's first block
+        x, covariance = generic._mode(flat, x, steps)
+        scale = cholesky(covariance[:3, :3])  # of omega
         weights = jax.vmap(lambda draw: _log_weight(flat, x, scale, draw))(draws)
         return jax.scipy.special.logsumexp(weights) - jnp.log(len(draws))
 

@@ -206,6 +206,15 @@ def test_proper_motion_prior_of_the_estimator():
 
 
 @pytest.mark.slow
+def test_inverse_and_determinant_are_numpys():
+    """Of rows whose units differ by a million, as the motion's do."""
+    rng = np.random.default_rng(3)
+    root = rng.normal(size=(40, 15)) * np.geomspace(1e-3, 1e3, 15)
+    inverse, log = generic_likelihood._inverse(root.T @ root)
+    assert np.allclose(inverse @ root.T @ root, np.eye(15), atol=1e-9)
+    assert float(log) == pytest.approx(np.linalg.slogdet(root.T @ root)[1], abs=1e-9)
+
+
 def test_laplace_of_the_generic_likelihood(monkeypatch):
     """With effects: against its own estimate by importance sampling, and its own differences."""
     rng = np.random.default_rng(7)

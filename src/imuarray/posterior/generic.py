@@ -18,7 +18,7 @@ from imuarray.engine.linearise import reading
 from imuarray.engine.readings import Readings
 from imuarray.errors import InputError
 from imuarray.model.effects import Prediction
-from imuarray.model.jax64 import cholesky, jax, jnp, log_determinant, solve_lower, solve_upper
+from imuarray.model.jax64 import jax, jnp
 from imuarray.posterior.settings import SETTINGS
 
 # Of noise and of the motion's prior; `posterior.marginal.scaled` has all but the last.
@@ -28,15 +28,33 @@ SCALES = (
 )  # fmt: skip
 
 
+def _inverse(matrix):
+    """(inverse, log determinant) of one (n, n) positive definite matrix, by sweeps of its rows.
+
+    A loop: unrolled for 15 rows, or by the steps of `_mode`, it would take a minute to compile.
+    """
+    here = jnp.arange(len(matrix))
+
+    def sweep(k, state):
+        matrix, log = state
+        pivot, row, column = matrix[k, k], matrix[k] / matrix[k, k], matrix[:, k]
+        swept = jnp.where(here[:, None] == k, row, matrix - jnp.outer(column, row))
+        own = jnp.where(here == k, 1.0, -column) / pivot
+        return jnp.where(here == k, own[:, None], swept), log + jnp.log(pivot)
+
+    return jax.lax.fori_loop(0, len(matrix), sweep, (matrix, 0.0))
+
+
 def _mode(flat, x, steps):
-    """Gauss-Newton on one sample's motion; returns x and the information's factor."""
-    for _ in range(steps):
+    """Gauss-Newton on one sample's motion; returns x and the inverse information near it."""
+
+    def step(_, state):
+        x, _ = state
         jac = jax.jacfwd(flat)(x)
-        factor = cholesky(jac.T @ jac)
-        gradient = (jac.T @ flat(x))[:, None]
-        x = x - solve_upper(factor, solve_lower(factor, gradient))[:, 0]
-    jac = jax.jacfwd(flat)(x)
-    return x, cholesky(jac.T @ jac)
+        inverse, _ = _inverse(jac.T @ jac)
+        return x - inverse @ (jac.T @ flat(x)), inverse
+
+    return jax.lax.fori_loop(0, steps, step, (x, jnp.zeros((x.size, x.size))))
 
 
 class Unknown(NamedTuple):
@@ -107,15 +125,13 @@ def log_laplace(model, parameters, given: Unknown, steps: int = SETTINGS.laplace
     fixed, _ = _whitened(model, still(parameters), given)
 
     def one(x, data):
-        mode, factor = still(_mode(lambda x: fixed(x, data), still(x), steps))
-        slope = jax.grad(lambda x: 0.5 * jnp.sum(residuals(x, data) ** 2))(mode)[:, None]
-        x = mode - solve_upper(factor, solve_lower(factor, slope))[:, 0]
+        mode, inverse = still(_mode(lambda x: fixed(x, data), still(x), steps))
+        x = mode - inverse @ jax.grad(lambda x: 0.5 * jnp.sum(residuals(x, data) ** 2))(mode)
         value, jac = residuals(x, data), jax.jacfwd(lambda x: residuals(x, data))(x)
         known = jac.T @ jac
-        factor = cholesky(still(known))
-        inverse = solve_upper(factor, solve_lower(factor, jnp.eye(x.size)))
-        # the determinant's derivative is that of the trace: none goes through the factor
-        spread = log_determinant(factor) + jnp.sum(inverse * (known - still(known)))
+        inverse, log = _inverse(still(known))
+        # the determinant's derivative is that of the trace
+        spread = log + jnp.sum(inverse * (known - still(known)))
         # the rest of the second derivative, to first order: it need not be positive far away; it
         # is so small that it needs no derivative of its own
         bend = jax.hessian(lambda z: fixed(z, data) @ still(value))(still(x))
