@@ -74,6 +74,6 @@ def test_short_jobs_do_not_wait_for_scipy_stats():
     """It is slow to import, and scipy.special has the laws that they need."""
     parts = "measured.positions", "measured.residuals", "claims", "figures.measured"
     papers = [f"imuarray_papers.{part}" for part in (*parts, "studies.checks.timing")]
-    names = ["imuarray.analysis.selection", *papers]
+    names = ["imuarray.analysis.selection", "imuarray.commands.board", *papers]
     code = f"import sys, {', '.join(names)}; sys.exit('scipy.stats' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from imuarray.analysis.garbage import without_garbage, without_garbage_of
 from imuarray.analysis.settings import SETTINGS
@@ -95,6 +94,8 @@ def _rough_positions(recording: Recording) -> tuple[np.ndarray, float]:
 
 def _equations(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients (n, `UNKNOWNS`) and forces (n, A - 1) of fast samples off the rails."""
+    from scipy.signal import savgol_filter  # slow to import, and every log comes by here
+
     lost = recording.at_rail("gyroscope") | recording.at_rail("accelerometer")
     expected = "readings off their rails, from which they follow"
     found = f"none of {len(lost)}: is a range, a unit or a scale wrong?"
