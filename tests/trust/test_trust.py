@@ -118,10 +118,10 @@ MISTAKES = {
         with_poses, "in the still poses is 1 m/s^2, gravity 9.807: in g declared"
     ),
     "gyroscopes in deg/s declared rad/s": (
-        lambda r: times(r, rate=1 / DEGREE), r"too small (57.3^2): gyroscopes in deg/s declared"
+        lambda r: times(r, rate=1 / DEGREE), "too small: gyroscopes in deg/s declared"
     ),
     "degrees to radians twice": (
-        lambda r: times(r, rate=DEGREE), r"too large (57.3^2): gyroscopes in rad/s declared"
+        lambda r: times(r, rate=DEGREE), "too large: gyroscopes in rad/s declared"
     ),
     "gyroscopes 2.4 % too large": (
         lambda r: times(r, rate=1.024), "angular acceleration says: gyroscopes 2."
@@ -129,6 +129,10 @@ MISTAKES = {
     "nominal positions in mm declared m": (
         lambda r: replace(r, accelerometer_position=1e3 * r.accelerometer_position),
         "nominal positions in mm declared m",
+    ),
+    "nominal positions in cm declared mm": (
+        lambda r: replace(r, accelerometer_position=0.1 * r.accelerometer_position),
+        "nominal positions in cm declared mm",
     ),
     "stamps in ms declared s": (
         lambda r: replace(r, time=1e3 * r.time), "in ms declared s"

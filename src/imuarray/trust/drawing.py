@@ -17,17 +17,15 @@ from imuarray.recording.units import GRAVITY
 from imuarray.trust.settings import SETTINGS
 
 DEGREE = np.degrees(1.0)
-MISTAKES = (
-    (DEGREE**-2, "gyroscopes in deg/s declared rad/s?", "57.3^2"),
-    (DEGREE**2, "gyroscopes in rad/s declared deg/s, or degrees turned to radians twice?",
-     "57.3^2"),
-    (DEGREE**4, "degrees turned to radians three times?", "57.3^4"),
-    (1 / GRAVITY, "specific force in g declared m/s^2?", "9.81"),
-    (GRAVITY, "specific force in m/s^2 declared g?", "9.81"),
-    (1e-3, "nominal positions in mm declared m?", "1000"),
-    (1e-2, "nominal positions in cm declared m?", "100"),
-    (0.0254, "nominal positions in inches declared m?", "39.4"),
-    (1e3, "nominal positions in m declared mm?", "1000"),
+LENGTHS = {"m": 1.0, "cm": 1e-2, "inches": 0.0254, "mm": 1e-3}
+MISTAKES = (  # (size of the array found over the drawn one, words)
+    (DEGREE**-2, "gyroscopes in deg/s declared rad/s"),
+    (DEGREE**2, "gyroscopes in rad/s declared deg/s, or degrees turned to radians twice"),
+    (DEGREE**4, "degrees turned to radians three times"),
+    (1 / GRAVITY, "specific force in g declared m/s^2"),
+    (GRAVITY, "specific force in m/s^2 declared g"),
+    *((size / LENGTHS[declared], f"nominal positions in {unit} declared {declared}")
+      for declared in ("m", "mm") for unit, size in LENGTHS.items() if unit != declared),
 )  # fmt: skip
 
 
@@ -111,7 +109,7 @@ def another_size(places: Places) -> str | None:
     other = abs(fitted - 1) > SETTINGS.far * sd and off < SETTINGS.same_shape
     if not other or SETTINGS.sizes[0] < size < SETTINGS.sizes[1]:
         return None
-    return size_words(size) if places.learnt() or _mistake(size) else None
+    return size_words(size) if places.learnt() or _mistakes(size) else None
 
 
 def size_words(size: float) -> str:
@@ -119,8 +117,8 @@ def size_words(size: float) -> str:
     off = factor_words(size)
     if SETTINGS.sizes[0] < size < SETTINGS.sizes[1]:
         cause = f": gyroscopes {factor_words(size**-0.5)}, or accelerometers {off}?"
-    elif found := _mistake(size):
-        cause = f" ({found[2]}): {found[1]}"
+    elif found := _mistakes(size):
+        cause = f": {', or '.join(found)}?"
     else:
         cause = ": a unit of the rates, of the specific force or of the nominal positions?"
     return f"the array comes out {off}{cause}"
@@ -134,8 +132,10 @@ def factor_words(factor: float) -> str:
     return f"{max(factor, 1 / factor):.4g} times too {word}"
 
 
-def _mistake(size: float) -> tuple[float, str, str] | None:
-    return next((one for one in MISTAKES if abs(np.log(size / one[0])) < 0.2), None)
+def _mistakes(size: float) -> list[str]:
+    """Words on the mistakes that make such a size, the nearest first."""
+    near = sorted((abs(np.log(size / factor)), words) for factor, words in MISTAKES)
+    return [words for off, words in near if off < 0.2]
 
 
 def _explained(places: Places) -> str | None:
