@@ -54,6 +54,24 @@ def test_bursts_of_garbage_are_lost_with_their_neighbours(recording):
     assert lines == [f"accelerometer {label}: 33 readings of bursts of garbage left out"]
 
 
+@pytest.mark.parametrize("kind", ["accelerometer", "gyroscope"])
+def test_a_triad_that_freezes_is_lost_while_it_does(recording, kind):
+    name = {"accelerometer": "specific_force", "gyroscope": "angular_rate"}[kind]
+    values = getattr(recording, name).copy()
+    values[400:440, 1], values[600:610, 1] = values[400, 1], values[600, 1]
+    found, lines = without_garbage(replace(recording, **{name: values}))
+    lost = getattr(found, f"saturated_{kind}s")() & ~getattr(recording, f"saturated_{kind}s")()
+    assert lost[401:440, 1].all() and lost.sum() == 3 * 39
+    label = getattr(recording, f"{kind}_labels")[1]
+    assert lines == [f"{kind} {label}: 39 frozen readings left out"]
+
+
+def test_what_all_repeat_is_no_frozen_triad(recording):
+    values = recording.specific_force.copy()
+    values[400:440] = values[400]
+    assert not without_garbage(replace(recording, specific_force=values))[1]
+
+
 def test_a_knock_is_no_garbage(recording):
     """All triads read it, each by its place; one far out reads most."""
     values = recording.specific_force.copy()

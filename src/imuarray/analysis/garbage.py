@@ -1,16 +1,19 @@
-"""Readings that no sensor made: rows of zeros, spikes, bursts of garbage of one triad."""
+"""Readings that no sensor made: rows of zeros, spikes, bursts of garbage, one triad frozen."""
 
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import binary_closing, median_filter
+from scipy.ndimage import binary_closing, binary_dilation, median_filter
 
 from imuarray.analysis.settings import SETTINGS
 from imuarray.recording import Recording
 from imuarray.recording.channels import runs
 from imuarray.recording.record import KINDS
 from imuarray.recording.rig import Log
+from imuarray.recording.settings import SETTINGS as RECORDING
+
+WHAT = "spikes", "readings of bursts of garbage", "frozen readings"  # `garbage`, `frozen`
 
 
 def without_garbage(recording: Recording) -> tuple[Recording, list[str]]:
@@ -21,15 +24,19 @@ def without_garbage(recording: Recording) -> tuple[Recording, list[str]]:
     if 0 < empty.sum() < SETTINGS.rare * empty.size:
         recording = recording.select(~empty)
         lines.append(f"{empty.sum()} rows of zeros left out")
+    turning = np.mean(np.sum(recording.angular_rate**2, axis=2), axis=1) > RECORDING.turning**2
     for kind, name in KINDS.items():
         values, labels = getattr(recording, name), getattr(recording, f"{kind}_labels")
+        held = frozen(values, turning)
+        released = binary_dilation(held, np.ones((3, 1)))  # a jump, but no spike
         parts = garbage(values, getattr(recording, f"{kind}_noise_sd"))
-        every = parts[0] | parts[1]
+        parts = *(part & ~released for part in parts), held
+        every = np.any(parts, axis=0)
         if not 0 < every.sum() < SETTINGS.rare * len(values):
             continue
         lost = getattr(recording, f"saturated_{kind}s")() | every[..., None]
         changed |= {name: bridged(values, every), f"{name}_saturated": lost}
-        for what, part in zip(("spikes", "readings of bursts of garbage"), parts, strict=True):
+        for what, part in zip(WHAT, parts, strict=True):
             if part.any():
                 whose = ", ".join(labels[k] for k in np.flatnonzero(part.any(axis=0)))
                 lines.append(f"{kind} {whose}: {part.sum()} {what} left out")
@@ -104,3 +111,17 @@ def garbage(values, noise: float) -> tuple[np.ndarray, np.ndarray]:
             if SETTINGS.burst[0] <= past - first <= SETTINGS.burst[1]:
                 bursts[first + 1 : past + 1, k] = True
     return spikes & ~bursts, bursts
+
+
+def frozen(values, turning) -> np.ndarray:
+    """(T, K) bool: readings that one triad repeats again and again while the array turns.
+
+    What all repeat is the log's doing, and another check's.
+    """
+    same, out = np.zeros(values.shape[:2], bool), np.zeros(values.shape[:2], bool)
+    same[1:] = np.all(values[1:] == values[:-1], axis=2) & turning[1:, None]
+    same &= ~same.all(axis=1, keepdims=True)
+    for k in np.flatnonzero(same.any(axis=0)):
+        for first, past in runs(same[:, k]):
+            out[first:past, k] = past - first >= RECORDING.frozen
+    return out
