@@ -121,3 +121,12 @@ def test_a_log_alone_is_left_without_garbage(recording):
 def test_a_clean_log_alone_stays_as_it_is(recording):
     log = log_of(recording)
     assert without_garbage_of(log) == (log, [])
+
+
+def test_a_log_alone_is_left_without_frozen_readings(recording):
+    force = recording.specific_force[:, 1].copy()
+    force[400:440] = force[400]
+    found, lines = without_garbage_of(log_of(recording, specific_force=force))
+    assert not np.isin(recording.time[401:440], found.accelerometer_time).any()
+    assert len(found.gyroscope_time) == len(recording.time)
+    assert lines == ["a: accelerometer: 39 readings of garbage left out"]

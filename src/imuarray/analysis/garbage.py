@@ -48,10 +48,14 @@ def without_garbage_of(log: Log) -> tuple[Log, list[str]]:
     lines: list[str] = []
     changed: dict[str, Any] = {}
     empty = log.accelerometer_time[~log.specific_force.any(axis=1)]  # no accelerometer reads that
+    speed = np.linalg.norm(log.angular_rate, axis=1)
     for kind, name in KINDS.items():
         time, values = getattr(log, f"{kind}_time"), getattr(log, name)
         zeros = ~values.any(axis=1) & np.isin(time, empty)
-        found = zeros | far_alone(values, getattr(log, f"{kind}_noise_sd"))
+        held = frozen(
+            values[:, None], np.interp(time, log.gyroscope_time, speed) > RECORDING.turning
+        )
+        found = zeros | far_alone(values, getattr(log, f"{kind}_noise_sd")) | held[:, 0]
         if 0 < found.sum() < SETTINGS.rare * len(time):
             changed |= {f"{kind}_time": time[~found], name: values[~found]}
             lines.append(f"{log.label}: {kind}: {found.sum()} readings of garbage left out")
@@ -116,11 +120,11 @@ def garbage(values, noise: float) -> tuple[np.ndarray, np.ndarray]:
 def frozen(values, turning) -> np.ndarray:
     """(T, K) bool: readings that one triad repeats again and again while the array turns.
 
-    What all repeat is the log's doing, and another check's.
+    What several repeat at once, all of them, is the log's doing, and another check's.
     """
     same, out = np.zeros(values.shape[:2], bool), np.zeros(values.shape[:2], bool)
     same[1:] = np.all(values[1:] == values[:-1], axis=2) & turning[1:, None]
-    same &= ~same.all(axis=1, keepdims=True)
+    same &= ~same.all(axis=1, keepdims=True) | (same.shape[1] == 1)
     for k in np.flatnonzero(same.any(axis=0)):
         for first, past in runs(same[:, k]):
             out[first:past, k] = past - first >= RECORDING.frozen
