@@ -123,9 +123,9 @@ def frozen(values, turning) -> np.ndarray:
     What several repeat at once, all of them, is the log's doing, and another check's.
     """
     same, out = np.zeros(values.shape[:2], bool), np.zeros(values.shape[:2], bool)
-    same[1:] = np.all(values[1:] == values[:-1], axis=2) & turning[1:, None]
+    same[1:] = np.all(values[1:] == values[:-1], axis=2)
     same &= ~same.all(axis=1, keepdims=True) | (same.shape[1] == 1)
     for k in np.flatnonzero(same.any(axis=0)):
-        for first, past in runs(same[:, k]):
-            out[first:past, k] = past - first >= RECORDING.frozen
+        for first, past in runs(same[:, k]):  # the one that is repeated may be no reading, too
+            out[first - 1 : past, k] |= turning[first:past].sum() >= RECORDING.frozen
     return out
