@@ -279,7 +279,10 @@ def _fewest(search: Search, effect: str, imus) -> tuple[int, ...]:
             gain, error = gains(rest)
             needs = gain >= search.least_z * error
         if not needs:
-            return tuple(sorted(order[:number]))
+            # the weakest of what all have may seem not to: those that have it must by themselves
+            own = SETTINGS.limit(effect) - np.log(len(imus))
+            alone = common or not search.smooth or needed(search, effect, own, [order[number - 1]])
+            return tuple(sorted(order[:number])) if alone else ()
     return ()
 
 
