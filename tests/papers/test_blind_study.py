@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import yaml
 
+from imuarray.diagnosis.procedure import run_procedure
 from imuarray_papers.blind import study, summary
-from imuarray_papers.blind.cases import Case, matrix
+from imuarray_papers.blind.cases import Case, make, matrix
 from imuarray_papers.blind.inject import CATALOGUE, EFFECTS
 from imuarray_papers.figures import blind as drawing
 from imuarray_papers.figures.style import columns, write_figure, write_table
@@ -343,3 +344,11 @@ def test_config_names_matrices_that_exist():
 def test_results_of_the_papers_do_not_depend_on_the_size_of_the_blind_study():
     config = yaml.safe_load((ROOT / "config.yaml").read_text(encoding="utf-8"))
     assert not any("blind" in key for key in effective(config, "quick")["scale"])
+
+
+@pytest.mark.parametrize("which", ["0126-gyroscope_bias", "0306-position_shift"])
+def test_a_weak_effect_of_all_imus_is_named_of_all(which):
+    """No four of eight show the rest too small; each of them needs it hardly by itself."""
+    (case,) = (c for c in matrix() if c.id == f"one-{which}+all-8sigma")
+    (found,) = run_procedure(make(case, 20260101)[0]).search.causes
+    assert (found.effect, len(found.imus)) == (which[5:], 8)
