@@ -66,6 +66,13 @@ def test_a_triad_that_freezes_is_lost_while_it_does(recording, kind):
     assert lines == [f"{kind} {label}: 40 frozen readings left out"]
 
 
+def test_a_triad_frozen_for_long_is_left_and_spikes_are_not(recording):
+    values = recording.specific_force.copy()
+    values[400:500, 1], values[50, 2, 0] = values[400, 1], values[50, 2, 0] + 50.0
+    lines = without_garbage(replace(recording, specific_force=values))[1]
+    assert lines == [f"accelerometer {recording.accelerometer_labels[2]}: 1 spikes left out"]
+
+
 def test_what_all_repeat_is_no_frozen_triad(recording):
     values = recording.specific_force.copy()
     values[400:440] = values[400]

@@ -205,7 +205,6 @@ def test_proper_motion_prior_of_the_estimator():
     assert error < 0.01
 
 
-@pytest.mark.slow
 def test_inverse_and_determinant_are_numpys():
     """Of rows whose units differ by a million, as the motion's do."""
     rng = np.random.default_rng(3)
@@ -215,6 +214,7 @@ def test_inverse_and_determinant_are_numpys():
     assert float(log) == pytest.approx(np.linalg.slogdet(root.T @ root)[1], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_laplace_of_the_generic_likelihood(monkeypatch):
     """With effects: against its own estimate by importance sampling, and its own differences."""
     rng = np.random.default_rng(7)

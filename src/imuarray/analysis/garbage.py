@@ -120,7 +120,7 @@ def garbage(values, noise: float) -> tuple[np.ndarray, np.ndarray]:
 def frozen(values, turning) -> np.ndarray:
     """(T, K) bool: readings that one triad repeats again and again while the array turns.
 
-    What several repeat at once, all of them, is the log's doing, and another check's.
+    None where all of several do so at once, or where they are many: that is another check's.
     """
     same, out = np.zeros(values.shape[:2], bool), np.zeros(values.shape[:2], bool)
     same[1:] = np.all(values[1:] == values[:-1], axis=2)
@@ -128,4 +128,4 @@ def frozen(values, turning) -> np.ndarray:
     for k in np.flatnonzero(same.any(axis=0)):
         for first, past in runs(same[:, k]):  # the one that is repeated may be no reading, too
             out[first - 1 : past, k] |= turning[first:past].sum() >= RECORDING.frozen
-    return out
+    return out & (out.sum() < SETTINGS.rare * len(values))
