@@ -265,13 +265,21 @@ def _fewest(search: Search, effect: str, imus) -> tuple[int, ...]:
         return heldout_gain(search, effect, parts, whose)
 
     common = any(item.id == effect for item, _ in columns.gauges(search.active))
+    most = (len(imus) - common) // 2
+    if search.smooth and not common:
+        # of what all have, half may seem to have none: who has it alone needs it by itself
+        limit = SETTINGS.limit(effect)
+        clear = [k for k in imus if needed(search, effect, limit - np.log(len(imus)), [k])]
+        rest = [imu for imu in imus if imu not in clear]
+        few = len(clear) <= most and not needed(search, effect, limit, rest)
+        return tuple(clear) if few else ()
     if common:  # a common part is nobody's, so none has it by itself: those far from most go first
         size = (columns.flat(search.fit.state) / columns.prior_sd)[list(imus)][:, mine]
         own = np.sum((size - np.median(size, axis=0)) ** 2, axis=1)
     else:
-        own = [(need(search, effect, [k]) if search.smooth else gains([k]))[0] for k in imus]
+        own = [gains([k])[0] for k in imus]
     order = [imus[place] for place in np.argsort(own)[::-1]]
-    for number in range(1, (len(imus) - common) // 2 + 1):
+    for number in range(1, most + 1):
         rest = order[number:]
         if search.smooth:
             needs = needed(search, effect, SETTINGS.others, rest)
@@ -279,10 +287,7 @@ def _fewest(search: Search, effect: str, imus) -> tuple[int, ...]:
             gain, error = gains(rest)
             needs = gain >= search.least_z * error
         if not needs:
-            # the weakest of what all have may seem not to: those that have it must by themselves
-            own = SETTINGS.limit(effect) - np.log(len(imus))
-            alone = common or not search.smooth or needed(search, effect, own, [order[number - 1]])
-            return tuple(sorted(order[:number])) if alone else ()
+            return tuple(sorted(order[:number]))
     return ()
 
 
