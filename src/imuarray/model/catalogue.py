@@ -84,7 +84,10 @@ def _axes_places(shape, axes):
     meaning="the three axes of an accelerometer sit at places of their own",
 )  # fmt: skip
 def size_effect(offset, instant, predicted):
-    """Axis i of triad k sits at r_k + R_k d_ki, in the chip's axes; ``offset`` (A, axis, xyz)."""
+    """Axis i of triad k sits at r_k + R_k d_ki, d_ki in the chip's axes.
+
+    ``offset`` (A, axis, xyz).
+    """
     here = kinematics.specific_force(instant.motion, instant.positions)
 
     def seen_by(axis):

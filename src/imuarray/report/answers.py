@@ -38,16 +38,16 @@ class Answer(NamedTuple):
     loud: str = ""
 
 
-def verdict(diagnosis: Diagnosis) -> str:
-    """The whole diagnosis, a sentence a cause and what they are worth; what to do next."""
+def verdict(diagnosis: Diagnosis) -> list[str]:
+    """The whole diagnosis: a sentence a cause, what they are worth, what is left."""
     document = diagnosis.document
     causes, labels = document["causes"], diagnosis.found.search.readings.labels
     if not causes:
         if document["unexplained"]:
-            return (
+            return [
                 "Unexplained: the plain model differs from the recording, and no known cause does."
-            )
-        return "Nothing: the plain model simulates this recording as far as it can show."
+            ]
+        return ["Nothing: the plain model simulates this recording as far as it can show."]
     parts = [f"{first_up(in_short(cause, labels))}." for cause in causes[:FEW]]
     if len(causes) > FEW:
         others = joined(spelled(cause["effect"]) for cause in causes[FEW:])
@@ -66,7 +66,7 @@ def verdict(diagnosis: Diagnosis) -> str:
             if alarming(document)
             else "Smooth samples are explained; what is left is motion faster than the samples."
         )
-    return " ".join(parts)
+    return parts
 
 
 def alarming(document: dict) -> bool:
@@ -137,10 +137,14 @@ def why(diagnosis: Diagnosis) -> Answer:
     lead = lead if len(items) > 1 else "One cause:"
     if document["smooth"]:
         sizes = {kind: document["smooth"][kind]["residual"] for kind in KINDS}
-        lead = f"In smooth samples that turn fast the residual is {of_noise(sizes)}. {lead}"
-    if document["unexplained"] and not loud:
-        items = [*items, f"Left is motion faster than the samples: {some(document['remaining'])}."]
-    elif document["remaining"] and not loud:
+        smooth = f"In smooth samples that turn fast the residual is {of_noise(sizes)}."
+        if document["unexplained"] and not loud:
+            smooth += (
+                " What is left elsewhere is motion faster than the samples:"
+                f" {some(document['remaining'])}."
+            )
+        lead = f"{smooth} {lead}"
+    if not document["unexplained"] and document["remaining"] and not loud:
         left = number(100 * max(1 - diagnosis.found.explained, 0.0), 2)
         lead = (
             f"The causes below leave {left} % of the excess misfit: within tolerance, though it"
@@ -273,8 +277,8 @@ def onward(diagnosis: Diagnosis) -> Answer:
         own = [spelled(name) for name in named if name in EFFECTS and EFFECTS[name].own]
         less = f" Without {joined(own)}: that is of this recording alone." if own else ""
         items.append(
-            "Use the model that has the causes, cal.nc beside this page: imuarray apply cal.nc and"
-            f" the recording make one sensor of the array.{less}"
+            "Use the model that has the causes, cal.nc beside this page: `imuarray apply cal.nc"
+            f" RECORDING --out motion.nc` makes one sensor of the array.{less}"
         )
     if alarming(document):
         items.append(

@@ -106,16 +106,16 @@ def advice(board: "Board", folder: Path = Path()) -> list[str]:
     if board.reasons or misfit(board.calibration) > MISFIT:
         said.append(
             "Check units, signs, which IMU is which and the drawing in columns.yaml; then let"
-            f" imuarray diagnose {corrected} --out diagnosis name what the model misses."
+            f" `imuarray diagnose {corrected} --out diagnosis` name what the model misses."
         )
     if board.reasons:
         return said
     return [
         *said,
         *_wanting(board),
-        f"Use it: imuarray apply {found} {corrected} --out motion.nc makes one sensor of the"
-        f" array, imuarray export {found} --format kalibr --out imu.yaml a file for other tools.",
-        "Record a second time and calibrate both (imuarray calibrate): what two recordings"
+        f"Use it: `imuarray apply {found} {corrected} --out motion.nc` makes one sensor of the"
+        f" array, `imuarray export {found} --format kalibr --out imu.yaml` a file for other tools.",
+        "Record a second time and calibrate both (`imuarray calibrate`): what two recordings"
         " agree on is what can be relied on.",
     ]
 

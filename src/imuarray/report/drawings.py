@@ -19,7 +19,7 @@ from imuarray.pictures.style import (
     shade,
     styled,
 )
-from imuarray.words import number, power_of_ten, spelled
+from imuarray.words import number, power_of_ten, shown_in, spelled, unit_shown
 
 MODELS = {
     "base": {"color": VERMILLION, "marker": "o", "label": "plain model"},
@@ -228,9 +228,10 @@ def detectable_figure(table: pd.DataFrame, footer=()):
     for place, row in enumerate(table.itertuples()):
         ends = row.best / row.typical, row.worst / row.typical
         axes.plot(ends, (place, place), color=BLUE, linewidth=4, solid_capstyle="butt")
+        factor, unit = shown_in(unit_shown(row.effect, "", row.unit), row.worst)[-1]
         said = (
-            f"{number(row.best, 2)} (IMU {plain(row.best_imu)}) to {number(row.worst, 2)} (IMU"
-            f" {plain(row.worst_imu)}) {row.unit if row.unit != '1' else ''}"
+            f"{number(factor * row.best, 2)} (IMU {plain(row.best_imu)}) to"
+            f" {number(factor * row.worst, 2)} (IMU {plain(row.worst_imu)}) {unit}"
         )
         axes.annotate(said, (1.01, place), xycoords=("axes fraction", "data"), size=6.5,
                       va="center")  # fmt: skip

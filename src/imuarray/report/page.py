@@ -1,6 +1,8 @@
 """Parts of the pages: drawings as they embed them, and the templates filled in."""
 
 import base64
+import html
+import re
 from functools import partial
 from typing import NamedTuple
 
@@ -98,11 +100,16 @@ def files(figure: Figure, table: pd.DataFrame, suffixes=SUFFIXES) -> dict[str, b
     return {one: numbers if one == "csv" else saved(figure, one) for one in suffixes}
 
 
+def marked(text: str) -> str:
+    """Text as HTML, `commands` as code."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text))
+
+
 def rendered(template: str, **given) -> str:
     """A page, every text in it escaped."""
     environment = Environment(
         loader=PackageLoader("imuarray.report", "."), undefined=StrictUndefined, autoescape=True
     )
-    environment.filters["numbered"] = numbered
+    environment.filters |= {"numbered": numbered, "marked": marked}
     environment.globals |= vars(words)  # which the tables call
     return environment.get_template(template).render(version=imuarray.__version__, **given)

@@ -50,7 +50,7 @@ LIMITS = {  # what the recording can tell, after the causes
         numbers.detectable_table, drawn.detectable_figure, "How small an effect would have shown",
         "Size from which an effect of one IMU passes the test with a chance of 80 %, from the IMU"
         " that shows it best to the one that shows it worst, over the prior sd of a common chip."
-        " The gain on held-out time asks more: it takes up to twice that size to be named."
+        " In rough motion the gain on held-out time asks more: up to twice that size."
         " Dots: what was found. Steps and clocks, which a scan looks for, are left out.",
     ),
     "positions": (

@@ -26,6 +26,7 @@ from imuarray.words.numbers import (
     probability,
     quantity,
     ratio,
+    shown_in,
     span,
     symbols,
     unit_shown,
