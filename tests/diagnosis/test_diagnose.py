@@ -35,6 +35,7 @@ from imuarray.streams import stream
 from imuarray.tails import log_chi_square
 from imuarray_papers.blind.cases import Case, make
 from imuarray_papers.blind.measured import hide
+from tests.engine.test_filters import filtered
 
 pytestmark = pytest.mark.slow
 
@@ -96,6 +97,15 @@ def test_one_effect_is_named_with_its_sensors(case):
     # outliers are in no model's score: what the tails gain on them stands with the cause alone
     assert abs(gain) < 0.1 if name in ("heavy_tails", "shock") else gain > 0
     assert truth["effects"][0]["effect"] == name
+
+
+@pytest.mark.parametrize(("corners", "imus"), [([98, 40, 98, 98], (1,)), ([20] * 4, (0, 1, 2, 3))])
+def test_low_passes_of_gyroscopes_are_a_lag_and_what_they_do_more(corners, imus):
+    found = run_procedure(filtered(corners, [98] * 4)[0])
+    named = {cause.effect: cause.imus for cause in found.search.causes}
+    assert named["gyroscope_delay"] == named["gyroscope_filter"] == imus
+    assert named.keys() <= {"gyroscope_delay", "gyroscope_filter", "accelerometer_band"}
+    assert not found.unexplained
 
 
 @pytest.mark.parametrize("case", ONE[:3], ids=lambda case: case.effects[0][0])

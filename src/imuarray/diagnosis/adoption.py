@@ -28,7 +28,7 @@ def tried(search: Search) -> list[Candidate]:
         (lesser, k, "") for c in search.causes if EFFECTS[c.effect].scanned
         for lesser in EFFECTS[c.effect].contains for k in c.imus
     }  # fmt: skip
-    found = candidates(search.columns, search.readings.exists, search.effects)
+    found = candidates(search.columns, search.readings.exists, search.offered)
     return [
         c for c in found
         if c not in search.refused and not any(
@@ -226,10 +226,11 @@ def rivals(search: Search, cause: Cause) -> list[str]:
     freed = given.places(freed_mask(search, effect))
     whole = len(cause.imus) > len(fit_.readings.exists) / 2
     present = {c.effect for c in search.causes}
+    others = [e for e in search.offered if e not in present and EFFECTS[e].beside != effect]
     tried = [
-        c for c in candidates(fit_.columns, fit_.readings.exists, search.effects)
-        if c.effect not in present and (c.whole if whole else c.imus == cause.imus)
-    ]  # fmt: skip
+        c for c in candidates(fit_.columns, fit_.readings.exists, others)
+        if (c.whole if whole else c.imus == cause.imus)
+    ]
     own, freedom = need(search, effect)
     own_log = log_chi_square(own, freedom) if freedom else 0.0
     scores = {s.candidate.effect: s for s in reversed(score_all(given, fit_, tried, freed))}

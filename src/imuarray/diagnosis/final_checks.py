@@ -191,7 +191,8 @@ def outlier_checks(search: Search) -> list[Check]:
 def plausibility_checks(search: Search) -> list[Check]:
     """Causes whose parameters are larger than such sensors have: misattributed."""
     columns, found = search.columns, []
-    whole = columns.flat(search.fit.state) / columns.usual_sd
+    # what triads of a kind have in common is no less usual than how they differ
+    whole = columns.flat(search.fit.state) / np.hypot(columns.usual_sd, columns.common_sd)
     for cause in search.causes:
         free = search.active[:, columns.of(cause.effect)]
         sizes = np.where(free, np.abs(whole[:, columns.of(cause.effect)]), 0.0)

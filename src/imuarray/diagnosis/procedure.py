@@ -97,7 +97,7 @@ def run_procedure(
     if fewer is not found:
         found, checks, named = ended(fewer, without, tailed)
     search, in_noise = found, [*in_noise, *shock, *named]
-    in_noise = list(filter(gains, in_noise))
+    in_noise = [item for item in in_noise if gains(search, item)]
     explained, failing = within_tolerance(search, checks, in_noise)
     beside = len(in_noise) + len(search.causes) > 1
     in_noise = [x for x in in_noise if x.log_p <= SETTINGS.limit(x.effect, beside)]
@@ -121,14 +121,14 @@ def ended(search: Search, without, tailed) -> tuple[Search, list[Check], list[Fi
         others = checks if other is search else final_checks(other, tailed)
         found = named_noise(other, without, tailed, True) if untied_by(others) else []
         limit = SETTINGS.limit(COLOURED, search.causes)
-        if any(x.effect == COLOURED and x.log_p <= limit and gains(x) for x in found):
+        if any(x.effect == COLOURED and x.log_p <= limit and gains(other, x) for x in found):
             return other, others, found
     return search, checks, named
 
 
-def gains(item: Finding) -> bool:
+def gains(search: Search, item: Finding) -> bool:
     """True of a clear gain on held-out time; a shock is in little of it."""
-    return item.effect == SHOCK or item.gain > SETTINGS.least_z * item.gain_se
+    return item.effect == SHOCK or item.gain > search.least_z * item.gain_se
 
 
 def untied_by(checks: list[Check]) -> bool:

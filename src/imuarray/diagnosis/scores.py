@@ -212,7 +212,7 @@ def detectable(search) -> dict[str, dict]:
     given, columns = search.given, search.columns
     active = given.places(search.active)
     inside = {part for c in search.causes for part in EFFECTS[c.effect].contains}
-    effects = [effect for effect in search.effects if effect not in inside]
+    effects = [effect for effect in search.offered if effect not in inside]
     every = candidates(columns, search.readings.exists, effects)
     scores = np.array([score for _, score in normal_blocks(search.fit, search.fit.described)])
     found: dict[str, dict] = {}

@@ -23,6 +23,7 @@ from imuarray.engine.parameters import POSITION, Columns
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS as CLOCKS
 from imuarray.engine.widths import residual_map_mask, spread_of
+from imuarray.model.effects import EFFECTS
 from imuarray.tails import log_chi_square
 
 
@@ -91,6 +92,12 @@ class Search:
     def imus_with(self, effect: str) -> tuple[int, ...]:
         """IMUs for which an effect is adopted."""
         return next((cause.imus for cause in self.causes if cause.effect == effect), ())
+
+    @property
+    def offered(self) -> list[str]:
+        """Effects that may be adopted now: some only beside another."""
+        there = {"", *(cause.effect for cause in self.causes)}
+        return [effect for effect in self.effects if EFFECTS[effect].beside in there]
 
     @property
     def clocks(self) -> tuple[int, ...]:
@@ -203,15 +210,20 @@ def freed_mask(search: Search, effect: str, imus=None, among=None) -> np.ndarray
     return mask if among is None else mask & np.isin(np.arange(search.columns.size), among)
 
 
-def need(search: Search, effect: str, imus=None, among=None) -> tuple[float, int]:
-    """(chi-square, degrees of freedom) of an adopted effect against zero, all else refitted."""
+def need(search: Search, effect: str, imus=None, among=None, without=()) -> tuple[float, int]:
+    """(chi-square, degrees of freedom) of an adopted effect against zero, all else refitted.
+
+    Of some ``imus``, or ``among`` its columns, where other IMUs are ``without`` it.
+    """
     mask, given = freed_mask(search, effect, imus, among), search.given
-    freed, active = given.places(mask), given.places(search.active & ~mask)
+    gone = mask | freed_mask(search, effect, list(without))
+    left = search.active & ~gone
+    freed, active = given.places(mask), given.places(left)
     # where that is not all that a mean was pinned of, none is
     precision = given.precision.copy()
-    precision[np.ix_(active, active)] = search.columns.prior_precision(search.active & ~mask)
+    precision[np.ix_(active, active)] = search.columns.prior_precision(left)
     given = replace(given, precision=precision)
-    return given.test(given.conditional(active, freed, freed), freed)
+    return given.test(given.conditional(active, given.places(gone), freed), freed)
 
 
 def heldout_gain(
@@ -265,35 +277,32 @@ def _fewest(search: Search, effect: str, imus) -> tuple[int, ...]:
         return heldout_gain(search, effect, parts, whose)
 
     common = any(item.id == effect for item, _ in columns.gauges(search.active))
-    most = (len(imus) - common) // 2
-    if search.smooth and not common:
-        # of what all have, half may seem to have none: who has it alone needs it by itself
-        limit = SETTINGS.limit(effect)
-        clear = [k for k in imus if needed(search, effect, limit - np.log(len(imus)), [k])]
-        rest = [imu for imu in imus if imu not in clear]
-        few = len(clear) <= most and not needed(search, effect, limit, rest)
-        return tuple(clear) if few else ()
     if common:  # a common part is nobody's, so none has it by itself: those far from most go first
         size = (columns.flat(search.fit.state) / columns.prior_sd)[list(imus)][:, mine]
         own = np.sum((size - np.median(size, axis=0)) ** 2, axis=1)
     else:
-        own = [gains([k])[0] for k in imus]
+        own = [(need(search, effect, [k]) if search.smooth else gains([k]))[0] for k in imus]
     order = [imus[place] for place in np.argsort(own)[::-1]]
-    for number in range(1, most + 1):
-        rest = order[number:]
-        if search.smooth:
-            needs = needed(search, effect, SETTINGS.others, rest)
+    strict, limit = search.smooth and not common, SETTINGS.limit(effect)
+    for number in range(1, (len(imus) - common) // 2 + 1):
+        keep, rest = order[:number], order[number:]
+        if search.smooth:  # one IMU alone is the usual fault: the others must clearly have it
+            alike = SETTINGS.others if number > 1 or common else limit
+            needs = needed(search, effect, alike, rest)
         else:
             gain, error = gains(rest)
             needs = gain >= search.least_z * error
         if not needs:
-            return tuple(sorted(order[:number]))
+            # of what all have, half may seem to have none: those who have it alone all need it
+            limit -= np.log(len(imus))
+            alone = all(needed(search, effect, limit, [k], rest) for k in keep if strict)
+            return tuple(sorted(keep)) if alone else ()
     return ()
 
 
-def needed(search: Search, effect: str, limit: float, imus=None) -> bool:
-    """True where an adopted effect is significant beside all else."""
-    statistic, freedom = need(search, effect, imus)
+def needed(search: Search, effect: str, limit: float, imus=None, without=()) -> bool:
+    """True where an adopted effect is significant beside all else, as `need` has it."""
+    statistic, freedom = need(search, effect, imus, without=without)
     return bool(freedom) and log_chi_square(statistic, freedom) < limit
 
 

@@ -160,11 +160,11 @@ def columns_of(array: Array, effects, position_sd: float) -> Columns:
 def catalogue_effects(without=(), smooth: bool = False) -> tuple[str, ...]:
     """The mean effects of a diagnosis, in the catalogue's order: those that any motion may tell.
 
-    And those that ``smooth`` motion tells, but for filters: a delay is most of these.
+    And those that ``smooth`` motion tells, but for filters that no delay stands for: it is most.
     """
     return tuple(
         name for name, one in EFFECTS.items()
-        if name not in without and (not one.smooth or (smooth and not one.sampling))
+        if name not in without and (not one.smooth or (smooth and (one.beside or not one.sampling)))
     )  # fmt: skip
 
 

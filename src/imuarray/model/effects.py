@@ -131,6 +131,8 @@ class Effect:
         one kind are alike. How much they differ, ``prior_sd`` at first, an estimate finds.
     smooth : bool
         Whether only smooth motion tells it: where it is rough, all that gyroscopes see is free.
+    beside : str
+        The effect beside which alone a diagnosis tests it, being what that leaves; "": any.
     """
 
     id: str
@@ -161,6 +163,7 @@ class Effect:
     sized: bool = False
     common_sd: float | tuple = 0.0
     smooth: bool = False
+    beside: str = ""
 
     @property
     def scope(self) -> str:

@@ -77,7 +77,7 @@ FILTER = {"derivatives": True, "sampling": True, "smooth": True}
 
 @effect(
     "gyroscope_filter", unit="s2, s3", prior_sd=(3e-6, 2e-8), common_sd=(3e-5, 2e-7),
-    shape=lambda a, g: (g, 2), components=(("droop", "skew"),), **FILTER,
+    shape=lambda a, g: (g, 2), components=(("droop", "skew"),), beside="gyroscope_delay", **FILTER,
     against="angular acceleration",
     meaning="the gyroscopes' filter differs from the accelerometers' by more than a delay",
 )  # fmt: skip
