@@ -352,3 +352,9 @@ def test_a_weak_effect_of_all_imus_is_named_of_all(which):
     (case,) = (c for c in matrix() if c.id == f"one-{which}+all-8sigma")
     (found,) = run_procedure(make(case, 20260101)[0]).search.causes
     assert (found.effect, len(found.imus)) == (which[5:], 8)
+
+
+def test_an_effect_of_two_imus_that_all_might_share_is_named_of_the_two():
+    (case,) = (c for c in matrix() if c.id.startswith("pair-0076-position_shift+two"))
+    causes = run_procedure(make(case, 20260101)[0]).search.causes
+    assert {c.effect: c.imus for c in causes}["position_shift"] == (0, 6)

@@ -228,7 +228,8 @@ def rivals(search: Search, cause: Cause) -> list[str]:
     present = {c.effect for c in search.causes}
     others = [e for e in search.offered if e not in present and EFFECTS[e].beside != effect]
     tried = [
-        c for c in candidates(fit_.columns, fit_.readings.exists, others)
+        c
+        for c in candidates(fit_.columns, fit_.readings.exists, others)
         if (c.whole if whole else c.imus == cause.imus)
     ]
     own, freedom = need(search, effect)

@@ -270,34 +270,38 @@ def _fewest(search: Search, effect: str, imus) -> tuple[int, ...]:
     Rough motion leaves what is significant in all, and predicts nothing: the rest must not gain
     clearly on held-out time.
     """
-    columns, mine = search.columns, search.columns.of(effect)
     parts = None if search.smooth else normal_blocks(search.fit, search.active)
-
-    def gains(whose) -> tuple[float, float]:
-        return heldout_gain(search, effect, parts, whose)
-
-    common = any(item.id == effect for item, _ in columns.gauges(search.active))
-    if common:  # a common part is nobody's, so none has it by itself: those far from most go first
-        size = (columns.flat(search.fit.state) / columns.prior_sd)[list(imus)][:, mine]
-        own = np.sum((size - np.median(size, axis=0)) ** 2, axis=1)
-    else:
-        own = [(need(search, effect, [k]) if search.smooth else gains([k]))[0] for k in imus]
-    order = [imus[place] for place in np.argsort(own)[::-1]]
-    strict, limit = search.smooth and not common, SETTINGS.limit(effect)
+    common = any(item.id == effect for item, _ in search.columns.gauges(search.active))
+    order, limit = _most_first(search, effect, imus, common, parts), SETTINGS.limit(effect)
     for number in range(1, (len(imus) - common) // 2 + 1):
         keep, rest = order[:number], order[number:]
         if search.smooth:  # one IMU alone is the usual fault: the others must clearly have it
             alike = SETTINGS.others if number > 1 or common else limit
             needs = needed(search, effect, alike, rest)
         else:
-            gain, error = gains(rest)
+            gain, error = heldout_gain(search, effect, parts, rest)
             needs = gain >= search.least_z * error
         if not needs:
             # of what all have, half may seem to have none: those who have it alone all need it
-            limit -= np.log(len(imus))
-            alone = all(needed(search, effect, limit, [k], rest) for k in keep if strict)
+            sure = limit - np.log(len(imus))
+            free = common or not search.smooth
+            alone = free or all(needed(search, effect, sure, [imu], rest) for imu in keep)
             return tuple(sorted(keep)) if alone else ()
     return ()
+
+
+def _most_first(search: Search, effect: str, imus, common: bool, parts) -> list[int]:
+    """The IMUs with an effect, those that need it most first."""
+    if common:  # a common part is nobody's, so none has it by itself: those far from most go first
+        columns = search.columns
+        size = (columns.flat(search.fit.state) / columns.prior_sd)[list(imus)]
+        size = size[:, columns.of(effect)]
+        own = np.sum((size - np.median(size, axis=0)) ** 2, axis=1)
+    elif search.smooth:
+        own = [need(search, effect, [imu])[0] for imu in imus]
+    else:
+        own = [heldout_gain(search, effect, parts, [imu])[0] for imu in imus]
+    return [imus[place] for place in np.argsort(own)[::-1]]
 
 
 def needed(search: Search, effect: str, limit: float, imus=None, without=()) -> bool:
