@@ -361,6 +361,9 @@ def test_a_lag_within_two_sds_is_none():
     assert none.startswith("no lag seen") and "0.017 ms" in none
     (some,) = sentences("gyroscope_delay", *sizes([[1.4e-5]] * 3, sd=1e-6))
     assert "run ahead of" in some
+    alone = {f"delay_{k}": (-6e-3 * (k == 2), 3e-6 * (k == 2)) for k in range(4)}
+    (lone,) = sentences("gyroscope_delay", alone, "0123")
+    assert lone.startswith("gyroscope 2 is 6.0000")
 
 
 def test_filters_are_said_by_what_they_take_of_motion():

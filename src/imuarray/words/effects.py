@@ -203,7 +203,9 @@ def _lag(sizes: Sizes) -> list[str]:
     size = f"{plus_minus(1e3 * abs(usual), 1e3 * error)} ms"
     side = "run ahead of" if usual > 0 else "lag behind"
     said = [f"the gyroscopes {side} the accelerometers by {size}"]
-    if abs(usual) < SEEN * error:
+    if usual == error == 0:  # it is of those that stand out alone
+        said = []
+    elif abs(usual) < SEEN * error:
         said = [f"no lag seen between gyroscopes and accelerometers ({size})"]
     for k in np.flatnonzero(out):
         own = plus_minus(1e3 * abs(values[k]), 1e3 * sds[k])
@@ -223,7 +225,8 @@ def _filtered(kind: str, sizes: Sizes) -> list[str]:
             for k in np.flatnonzero(out)]  # fmt: skip
     if "lag" not in each and not out.all():
         mean, sd = np.mean(less[~out]), np.mean(sds[~out])
-        said.insert(0, ("the gyroscopes show", mean, sd, "the accelerometers"))
+        if sd > 0:  # else it is of those that stand out alone
+            said.insert(0, ("the gyroscopes show", mean, sd, "the accelerometers"))
     return [
         f"of motion at {SHOWN_HZ:g} Hz {shows} {quantity(abs(x), sd, '%')}"
         f" {'less' if x > 0 else 'more'} than {others}, by a filter"
