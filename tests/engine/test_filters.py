@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 import imuarray
 from imuarray.engine import forward
 from imuarray.engine.derivatives import derivatives
+from imuarray.engine.estimate import estimate
 from imuarray.engine.forward import BAND, FILTER, OWN, select_forward, with_effects
 from imuarray.engine.readings import arrange
 from imuarray.engine.start import is_smooth
@@ -131,6 +132,20 @@ def test_an_accelerometers_low_pass_is_found():
     late, wide = (each[2] - np.mean(each[[0, 1, 3]]) for each in (lag, droop - lag**2 / 2))
     assert late == pytest.approx(times[1] - times[0], rel=0.02)
     assert wide == pytest.approx((times[0] ** 2 - times[1] ** 2) / 2, rel=0.4)
+
+
+def test_delays_of_an_imu_and_of_both_its_sensors_are_two_numbers():
+    """A third leaves the fit a valley: it went to and fro in one, to a status of 3."""
+    readings = arrange(filtered([98, 98, 20, 98], [98, 98, 98, 40])[0], sparse=True)
+    names = [forward.DELAYS, forward.LAG, FILTER, OWN]
+    columns, begun = forward._begun([readings], names)
+    found = estimate(begun, columns, columns.mask(["position"]), steps=1)
+    start = forward.Selected(found, (readings.keep,), {})
+    found = start.with_kept([OWN, forward.LAG]).fitted(2).with_kept(names).fitted().found
+    lag = columns.flat(found.recorded[0].state)[:, columns.of("accelerometer_filter")[0]]
+    scale = 1 / np.sqrt(np.diag(found.information))
+    assert found.converged and not lag.any()
+    assert np.linalg.cond(found.information * np.outer(scale, scale)) < 5e7
 
 
 LAG, DROOP = "gyroscope_delay delay", "gyroscope_filter droop"

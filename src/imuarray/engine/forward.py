@@ -135,11 +135,7 @@ def select_forward(
             now, clocks = now.clocked()
         groups = now.tried(names)
         now = now.with_kept([group.name for group in groups if group.kept])
-        each = {group.name: group.gain for group in groups}
-        if {LAG, OWN, DELAYS} <= before & each.keys():  # one says what the two others do
-            less = min(OWN, DELAYS, key=each.__getitem__)
-            now, names = now.without([less]), [name for name in names if name != less]
-        elif set(now.kept) == before:
+        if set(now.kept) == before:
             needed = now.needed(names, {group.name for group in groups if group.kept})
             groups = [group._replace(kept=group.kept or group.name in needed) for group in groups]
             now = now.with_kept(needed)
@@ -202,9 +198,16 @@ class Selected(NamedTuple):
 
     @property
     def active(self) -> np.ndarray:
-        """Parameters (N, m) of the positions and of what is kept."""
-        placed = self.found.columns.mask([POSITION])
-        return np.any([placed, *self.kept.values()], axis=0)
+        """Parameters (N, m) of the positions and of what is kept, each direction of time once."""
+        columns = self.found.columns
+        found = np.any([columns.mask([POSITION]), *self.kept.values()], axis=0)
+        imus, gyroscopes = (
+            (found & columns.mask(names)).any(axis=1, keepdims=True)
+            for names in (("sensor_delay", CLOCK), EFFECT_GROUPS[LAG])
+        )
+        # an accelerometer's lag is its IMU's delay, less as much of its gyroscope's
+        lag = columns.mask(EFFECT_GROUPS[OWN]) & [place == (0,) for place in columns.places]
+        return found & ~(lag & imus & gyroscopes)
 
     def with_kept(self, names) -> Self:
         """With more groups kept."""
@@ -214,12 +217,16 @@ class Selected(NamedTuple):
     def without(self, names) -> Self:
         """Without some of those kept, their parameters back at zero."""
         now = self._replace(kept={n: mask for n, mask in self.kept.items() if n not in names})
+        return now._replace(found=replace(self.found, recorded=now._emptied()))
+
+    def _emptied(self) -> tuple[Recorded, ...]:
+        """The recordings, with what was fitted and is no more at zero."""
         found, recorded = self.found, []
         for one in found.recorded:
             whole = found.columns.flat(one.state)
-            whole[found.active & ~now.active] = 0.0
+            whole[found.active & ~self.active] = 0.0
             recorded.append(replace(one, state=found.columns.unflat(one.state, whole)))
-        return now._replace(found=replace(found, recorded=tuple(recorded)))
+        return tuple(recorded)
 
     def tried(self, names) -> list[EffectGroup]:
         """Gains of the groups, but those of which a clock is the whole, and `_with_slope`'s."""
@@ -264,7 +271,7 @@ class Selected(NamedTuple):
 
     def fitted(self, steps: int = SETTINGS.iterations) -> Self:
         """With all that is kept estimated, each reading in its clock's turn."""
-        columns, recorded = self.found.columns, list(self.found.recorded)
+        columns, recorded = self.found.columns, self._emptied()
         if CLOCKS in self.kept:
             imus = np.flatnonzero(self.kept[CLOCKS].any(axis=1))
             recorded = [
