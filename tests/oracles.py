@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import logsumexp
 
-from imuarray.estimation.collapsed import estimate_motion
 from imuarray.model import ArrayModel
 from imuarray.model.jax64 import jax, jnp
 from imuarray.motion import Motion
+from imuarray_papers.estimation.collapsed import estimate_motion
 from imuarray_papers.reference import linear_part, nonlinear_part, projection, skew
 
 

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import imuarray
+import imuarray_papers
 
 INNER = "from pack.compiled import njit\n\n@njit\ndef inner(x):\n    return x + {}\n"
 OUTER = """
@@ -30,7 +30,7 @@ def test_a_change_in_a_kernel_reaches_those_that_call_it(tmp_path):
     package = tmp_path / "pack"
     package.mkdir()
     (package / "__init__.py").touch()
-    shutil.copy(Path(imuarray.__file__).with_name("compiled.py"), package)
+    shutil.copy(Path(imuarray_papers.__file__).with_name("compiled.py"), package)
     (package / "outer.py").write_text(OUTER)
     (package / "inner.py").write_text(INNER.format(1))
     assert [said(tmp_path), said(tmp_path)] == ["20 0", "20 1"]

@@ -16,7 +16,7 @@ import faulthandler
 from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from imuarray_papers.estimation.bcd import calibrate_bcd
-from imuarray.estimation.collapsed import estimate_motion
+from imuarray_papers.estimation.collapsed import estimate_motion
 from imuarray.model import ArrayModel, kinematics
 from imuarray.model.jax64 import jax
 from imuarray.model.structure import _force

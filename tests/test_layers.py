@@ -14,15 +14,16 @@ TOOL, PAPERS = (Path(package.__file__).parent for package in (imuarray, imuarray
 # Each rests on those above it, or beside it; the injector of the blind study on no model at all.
 LAYERS = {
     TOOL: (
-        ("errors", "caches", "linear", "tails", "threads"), ("compiled",),
+        ("errors", "caches", "linear", "tails", "threads"),
         ("streams", "provenance", "geometry"), ("motion",), ("model",), ("words",),
-        ("recording",), ("simulation", "firstorder", "estimation"), ("alignment", "engine"),
+        ("recording",), ("simulation", "firstorder"), ("alignment", "engine"),
         ("posterior",), ("diagnosis",), ("pictures",), ("report", "plots"), ("trust",),
         ("analysis",), ("commands",), ("cli",), ("__main__",),
     ),
     PAPERS: (
-        ("config", "reference", "estimation", "blind"), ("posterior",), ("measured",),
-        ("studies", "sampling"), ("claims", "figures"), ("pipeline", "commands"), ("__main__",),
+        ("compiled",), ("config", "reference", "estimation", "blind"), ("posterior",),
+        ("measured", "calibration"), ("studies", "sampling"), ("claims", "figures"),
+        ("pipeline", "commands"), ("__main__",),
     ),
 }  # fmt: skip
 
@@ -55,6 +56,17 @@ def test_imports_run_one_way(package):
 
 def test_the_tool_knows_nothing_of_the_papers():
     assert not [path for path in TOOL.rglob("*.py") if imported(path, "imuarray_papers")]
+
+
+def test_the_tool_does_without_the_papers_compiler():
+    names = ["imuarray.analysis.sampling", "imuarray.analysis.calibration", "imuarray.cli"]
+    names += [
+        "imuarray.commands.board",
+        "imuarray.commands.diagnose",
+        "imuarray.diagnosis.document",
+    ]
+    code = f"import sys, {', '.join(names)}; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 
 def test_trust_is_entered_by_its_door():

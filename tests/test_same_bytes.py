@@ -9,7 +9,7 @@ import pytest
 SCRIPT = """
 import hashlib
 import numpy as np
-from imuarray.estimation.newton import calibrate_gauss_newton
+from imuarray_papers.estimation.newton import calibrate_gauss_newton
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion

@@ -14,8 +14,6 @@ from .analysis.sampling import summary as summary
 from .diagnosis.document import diagnose as diagnose
 from .engine.dataset import diagnosed as diagnosed
 from .errors import InputError as InputError
-from .estimation.collapsed import estimate_motion as estimate_motion
-from .estimation.newton import calibrate_gauss_newton as calibrate_gauss_newton
 from .firstorder.noise import allan as allan
 from .geometry.array import Array as Array
 from .geometry.boards import mimu4444 as mimu4444

@@ -51,7 +51,9 @@ def versions() -> dict[str, str]:
     Code from outside has its SHA-256.
     """
     found = {"imuarray": imuarray.__version__, "python": platform.python_version()}
-    found |= {name: metadata.version(name) for name in _LIBRARIES}
+    for name in _LIBRARIES:
+        with suppress(metadata.PackageNotFoundError):  # numba is the papers' alone
+            found[name] = metadata.version(name)
     for place, (name, _) in _ADDED.items():
         value = code_version(place)
         found[name] = f"{found[name]}, {value}" if name in found else value

@@ -1,15 +1,12 @@
 """The work behind `python -m imuarray_papers`: what the papers did, for one's own recording."""
 
-from functools import partial
-
-from imuarray.analysis.calibration import calibrate_papers
 from imuarray.analysis.model import assumed
 from imuarray.commands import calibrate as calibrating
 from imuarray.commands import sample as sampling
 from imuarray.commands.output import Answer, Output
 from imuarray.recording import read_recording
 from imuarray.trust import of_file, reasons_of_poses, reasons_of_posterior
-from imuarray_papers.estimation.bcd import calibrate_bcd
+from imuarray_papers.calibration import calibrate as calibrated
 from imuarray_papers.sampling import SHRUNK
 from imuarray_papers.sampling import sample as sampled
 
@@ -17,8 +14,7 @@ from imuarray_papers.sampling import sample as sampled
 def calibrate(arguments, output: Output) -> Answer:
     """Positions by ML-BCD; `imuarray calibrate --model papers` finds the same faster."""
     recording = read_recording(arguments.recording)
-    search = partial(calibrate_bcd, tolerance=1e-9)
-    dataset = calibrate_papers(recording, arguments.accelerometer_noise, output.notify, search)
+    dataset = calibrated(recording, arguments.accelerometer_noise, output.notify)
     arguments.recordings = [arguments.recording]
     return calibrating.written(dataset, [recording], arguments)
 

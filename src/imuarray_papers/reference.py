@@ -1,7 +1,7 @@
 """Paper 2021 written out, to be read first: (5a), (22), (23), (26a); slow and obvious, in numpy.
 
 `imuarray_papers.posterior.likelihood` does the same in six numbers a sample instead of 3 K, some
-hundred times as fast; `tests/estimation/test_collapsed.py` holds it to this page.
+hundred times as fast; `tests/papers/test_collapsed.py` holds it to this page.
 """
 
 import numpy as np

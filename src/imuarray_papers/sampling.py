@@ -7,7 +7,7 @@ import xarray as xr
 
 from imuarray.analysis.density import NOT_CONVERGED, Posterior, prior_of
 from imuarray.analysis.model import Notify, assumed, silent, usable
-from imuarray.analysis.noise import mode_of
+from imuarray.analysis.noise import as_declared, mode_of
 from imuarray.analysis.sampling import NUTS_STEPS, NUTS_WARMUP, tree_of
 from imuarray.engine.parameters import model_of
 from imuarray.errors import InputError, require_one_of
@@ -68,7 +68,7 @@ def flat(recording: Recording, rates: str = "declared", notify: Notify = silent)
         found = locate(recording, recording.accelerometer_noise_sd)
         mode, density = found.mean, sample_covariance(recording.angular_rate)
     else:
-        found = mode_of(recording, model)
+        found = mode_of(*as_declared(recording))
         mode = found.positions
     if not found.converged:
         notify(NOT_CONVERGED)

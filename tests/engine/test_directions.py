@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from imuarray.engine.directions import patterns, weak_directions
-from imuarray.estimation.information import information_at
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
+from imuarray_papers.estimation.information import information_at
 
 ARRAY = mimu4444()
 

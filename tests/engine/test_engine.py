@@ -155,7 +155,7 @@ def test_positions_sds_and_noise_are_right():
 def with_turning(found):
     """The estimate again, the rate's slope as prior of the angular acceleration."""
     begun = [replace(one, state=turned(one.readings, one.state, True)) for one in found.recorded]
-    return estimate(begun, found.columns, found.active, robust=False)
+    return estimate(begun, found.columns, found.active, noise="normal")
 
 
 @pytest.mark.parametrize("kinds", [(1, 0), (0, 1), (1, 1)])
@@ -164,19 +164,19 @@ def test_what_a_correction_left_widens_by_as_much_as_it_moves(kinds, again):
     """Maps of which one direction is uncertain, against readings that are changed along it."""
     recording, _ = simulated(2.0, bandwidth=2.0)
     recording = replace(recording, angular_rate_saturated=recording.saturated_gyroscopes())
-    bare, rng = again(fitted(recording, robust=False)), np.random.default_rng(2)
+    bare, rng = again(fitted(recording, noise="normal")), np.random.default_rng(2)
     changes = 2e-4 * rng.standard_normal((4, 3, 3)), np.tile(1e-3 * np.eye(3), (4, 1, 1))
     changes = np.array(kinds)[:, None, None, None] * np.array(changes)
     moved = {
         name: getattr(recording, name) + np.einsum("kij,tkj->tki", change, getattr(recording, name))
         for name, change in zip(("specific_force", "angular_rate"), changes, strict=True)
     }
-    other = again(fitted(replace(recording, **moved), robust=False))
+    other = again(fitted(replace(recording, **moved), noise="normal"))
     size = np.abs(other.positions - bare.positions)[1:].ravel()
     # so small that the readings say nothing of it
     spread = 0.05**2 * np.outer(changes, changes)
     left, known = (
-        widened(again(fitted(replace(recording, map_covariance=part * spread), robust=False)))
+        widened(again(fitted(replace(recording, map_covariance=part * spread), noise="normal")))
         for part in (1.0, 1e-6)
     )
     added = np.sqrt(widths(left)[1] ** 2 - widths(known)[1] ** 2)
@@ -188,7 +188,7 @@ def jointly(*recordings):
     readings = [arrange(one, sparse=True) for one in recordings]
     columns = columns_of(readings[0].array, (), readings[0].position_prior_sd)
     begun = [Recorded.of(one, columns) for one in readings]
-    return estimate(begun, columns, columns.mask([POSITION]), robust=False)
+    return estimate(begun, columns, columns.mask([POSITION]), noise="normal")
 
 
 def test_recordings_that_one_calibration_corrected_err_alike():
@@ -312,7 +312,7 @@ def test_readings_far_out_lose_their_say():
     hit = rng.random(force.shape[:2]) < 0.04
     force[hit] += 40 * recording.accelerometer_noise_sd * rng.standard_normal((hit.sum(), 3))
     struck = replace(recording, specific_force=force)
-    clean, robust, plain = fitted(recording), fitted(struck), fitted(struck, robust=False)
+    clean, robust, plain = fitted(recording), fitted(struck), fitted(struck, noise="normal")
     size = [np.sqrt(np.mean(errors(f, truth) ** 2)) for f in (clean, robust, plain)]
     assert size[1] < 2.5 * size[0] < size[2]
     assert robust.freedoms[0] < 5 and robust.freedoms[1] >= 20

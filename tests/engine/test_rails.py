@@ -8,10 +8,10 @@ from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.fusion import better, equations, fuse, one_sided, turned
 from imuarray.engine.linearise import State
 from imuarray.engine.readings import measured
-from imuarray.estimation.collapsed import Collapsed, motion_from
 from imuarray.model import Noise
 from imuarray.motion import Motion, normal_motion
 from imuarray.simulation.recordings import measure
+from imuarray_papers.estimation.collapsed import Collapsed, motion_from
 from tests.cases import model
 
 RAIL = 5.0

@@ -12,12 +12,12 @@ from scipy.stats import multivariate_normal
 from imuarray.analysis.selection import disjoint, select_dynamic
 from imuarray.cli import main
 from imuarray.errors import InputError
-from imuarray.estimation.newton import calibrate_gauss_newton
 from imuarray.geometry import mimu4444_corners
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting, normal_motion
 from imuarray.recording import write_recording
 from imuarray.simulation.recordings import simulate_recording, simulate_samples
+from imuarray_papers.estimation.newton import calibrate_gauss_newton
 from imuarray_papers.measured.positions import (
     agreement,
     bcd_positions,

@@ -10,7 +10,7 @@ import pytest
 from numba.core.errors import TypingError
 from scipy import stats
 
-from imuarray import compiled
+from imuarray_papers import compiled
 from imuarray_papers.posterior import normals
 
 

@@ -10,9 +10,9 @@ import pytest
 import imuarray
 from imuarray.analysis.model import silent
 from imuarray.analysis.sensors import fitted
-from imuarray.estimation.newton import fisher_scoring
 from imuarray.geometry import positions_of, sub_array
 from imuarray_papers.config import read_config
+from imuarray_papers.estimation.newton import fisher_scoring
 from imuarray_papers.figures import uncertainty
 from imuarray_papers.figures.uncertainty import coverage
 from imuarray_papers.studies import sbc, truths

@@ -12,7 +12,7 @@ from imuarray.errors import InputError
 from imuarray.model import ArrayModel
 from imuarray.model.jax64 import jax, jnp
 from imuarray.posterior import generic as generic_likelihood
-from imuarray.posterior.marginal import Marginal, grid, log_marginal, scaled
+from imuarray.posterior.marginal import grid, log_marginal, scaled
 from imuarray_papers.posterior.likelihood import Likelihood
 from imuarray_papers.reference import linear_part, nonlinear_part
 from tests import oracles
@@ -150,8 +150,7 @@ def proper(seed=1, gyroscope_sd=0.05):
     off = rate - rate.mean(axis=1, keepdims=True)
     apart = model.noise.misfit(np.zeros((len(force), 15)), off)
     spread = apart, rate.size
-    marginal = Marginal.of(likelihood.collapsed, positions, None, MOTION_SD, 7, spread)
-    return marginal, force, rate, model, positions
+    return likelihood.marginal(positions, 7, spread), force, rate, model, positions
 
 
 def test_unknown_noise_and_motion_against_dense_normals():

@@ -11,7 +11,6 @@ from imuarray.analysis import noise
 from imuarray.analysis.density import posterior_of
 from imuarray.cli import main
 from imuarray.errors import InputError
-from imuarray.estimation import newton
 from imuarray.geometry import positions_of, sub_array
 from imuarray.model.jax64 import jnp
 from imuarray.posterior.diagnostics import ess, rhat
@@ -111,8 +110,7 @@ def test_a_mode_that_was_not_reached_is_told(monkeypatch):
     said: list[str] = []
     posterior_of(recording, notify=said.append)
     assert not said
-    stopped = partial(newton.calibrate_gauss_newton, limit=1)
-    monkeypatch.setattr(noise, "calibrate_gauss_newton", stopped)
+    monkeypatch.setattr(noise, "estimate", partial(noise.estimate, steps=1))
     posterior_of(recording, notify=said.append)
     (text,) = said
     assert "did not converge" in text

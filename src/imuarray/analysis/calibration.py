@@ -3,15 +3,10 @@
 from collections.abc import Sequence
 from os import PathLike
 
-import numpy as np
 import xarray as xr
 
-from imuarray.analysis.model import Notify, assumed, require_together, silent, usable
-from imuarray.analysis.sensors import calibrate_sensors, finished
-from imuarray.engine.dataset import motion_variables, noise_variables, positions_dataset
-from imuarray.engine.parameters import model_of
-from imuarray.estimation.newton import calibrate_gauss_newton, parameter_covariance
-from imuarray.model import ArrayModel
+from imuarray.analysis.model import Notify, assumed, require_together, silent
+from imuarray.analysis.sensors import calibrate_sensors
 from imuarray.recording import Recording
 
 
@@ -29,8 +24,8 @@ def calibrate(
         positions are the same and whose biases and clocks are each its own.
     model
         ``"sensors"``: the standard sensor model, each part kept where it gains on held-out time,
-        with noise estimated for each triad; ``"papers"``: that of paper 2017, with the declared
-        noise, any number of samples; or the path of a calibration: its effects and sensors,
+        with noise estimated for each triad; ``"papers"``: that of paper 2017, positions and motion
+        alone, with the declared noise; or the path of a calibration: its effects and sensors,
         estimated again.
     effects
         Names of effects (docs/effects.md) to have in the model instead of those of ``model``.
@@ -68,49 +63,5 @@ def calibrate(
     """
     recordings = [recording] if isinstance(recording, Recording) else list(recording)
     require_together(model, recordings, effects, accelerometer_noise)
-    if model == "papers":
-        return calibrate_papers(recordings[0], accelerometer_noise, notify)
+    recordings = [assumed(one, accelerometer_noise) for one in recordings]
     return calibrate_sensors(recordings, str(model), effects, notify)
-
-
-def calibrate_papers(
-    recording: Recording, accelerometer_noise: float | None = None, notify: Notify = silent,
-    search=calibrate_gauss_newton,
-) -> xr.Dataset:  # fmt: skip
-    """`calibrate` by maximum likelihood with the declared noise (paper 2017).
-
-    ``search``: another search of the arguments of `calibrate_gauss_newton`.
-    """
-    given, recording = recording, assumed(usable(recording, notify), accelerometer_noise)
-    model = model_of(recording)
-    whole, saturated = recording.in_memory(), recording.saturated_gyroscopes()
-    found = search(model, whole.specific_force, whole.angular_rate, saturated=saturated)
-    covariance = found.covariance
-    if covariance is None:
-        covariance = parameter_covariance(model, found, saturated)
-    dataset = positions_dataset(recording, found.positions, covariance)
-    variables = motion_variables(found.motion.motion[:3]) | noise_variables(model.noise)
-    variables |= {
-        "motion_converged": (("time",), found.motion.converged),
-        "cost": (("iteration",), found.cost),
-        "position_step": (("iteration",), found.step, {"units": "m"}),
-    }
-    dataset = dataset.assign(variables).assign_coords(time=recording.time)
-    dataset.attrs |= {"converged": int(found.converged), "samples": len(recording.time)}
-    dataset.attrs["residual_ratio"] = residual_ratio(recording, model, found)
-    return finished(dataset, [given], "papers")
-
-
-def residual_ratio(recording: Recording, model: ArrayModel, found) -> float:
-    """Rms residual over the declared noise, degrees of freedom allowed for; NaN without any."""
-    samples, count = recording.specific_force.shape[:2]
-    freedom, misfit, start = 3 * samples * (count + recording.angular_rate.shape[1]), 0.0, 0
-    freedom -= 9 * samples + 3 * (count - 1)
-    for part in recording.parts():
-        motion = found.motion.motion.select(slice(start, start + len(part.time)))
-        force, rate = model.predict_many(motion, found.positions)
-        saturated = part.saturated_gyroscopes()
-        off = part.specific_force - force, part.angular_rate - rate
-        misfit += model.noise.misfit(*off, saturated)
-        freedom, start = freedom - int(saturated.sum()), start + len(part.time)
-    return float(np.sqrt(misfit / freedom)) if freedom > 0 else float("nan")

@@ -22,8 +22,6 @@ from imuarray.engine.estimate import Estimate
 from imuarray.engine.parameters import model_of
 from imuarray.engine.readings import Readings
 from imuarray.engine.widths import priors_of
-from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.newton import apart
 from imuarray.geometry import positions_of
 from imuarray.linear import scaled_inverse
 from imuarray.model import ArrayModel
@@ -47,7 +45,7 @@ class Posterior(NamedTuple):
     mode: np.ndarray  # (P,)
     covariance: np.ndarray  # (P, P) about the mode's
     scales: tuple[str, ...]  # of `SCALES`, those whose logs are unknown
-    motion: np.ndarray | None = None  # (T, 9 or 15) at the mode; with effects
+    motion: np.ndarray | None = None  # (T, 9 or 15) at the mode
     readings: Readings | None = None  # with effects: what is sampled from, with its noise
     converged: bool = True  # with effects: whether the search for the mode did
     size_sd: float = 0.0  # of the logarithm of a factor that the density leaves out
@@ -60,11 +58,13 @@ def posterior_of(recording: Recording, known: bool = False, notify: Notify = sil
     log-normal priors a factor of twenty wide. ``known``: whether the accelerometers' noise is the
     declared one.
     """
-    chosen, found, estimated = estimated_noise(recording, known, notify)
+    readings, found, estimated = estimated_noise(recording, known, notify)
     if not found.converged:
         notify(NOT_CONVERGED)
     # s is flat: differences between triads do not show it
-    chosen = replace(chosen, motion_sd=(*estimated.motion_sd[:2], np.inf))
+    chosen = replace(
+        model_of(recording), noise=noise_of(readings), motion_sd=(*estimated.motion_sd[:2], np.inf)
+    )
     free = [not known, True, True, True, False]
     unknown = unknown_scales(recording, chosen, estimated, np.zeros(3), len(recording.time))
     before, freedom = (part[free] for part in unknown)
@@ -77,6 +77,7 @@ def posterior_of(recording: Recording, known: bool = False, notify: Notify = sil
         np.concatenate([found.positions[1:].ravel(), np.zeros(sum(free))]),
         block_diag(found.covariance, np.diag(0.5 / np.maximum(freedom, 1.0))),
         tuple(name for name, one in zip(SCALES, free, strict=True) if one),
+        found.state.motion,
     )  # fmt: skip
 
 
@@ -185,20 +186,31 @@ def traced(posterior: Posterior, notify: Notify = silent):
         assert posterior.readings is not None  # there are, with effects
         given = unknown(posterior.readings, posterior.motion, spread)
         return log_extended(posterior.model), (given, prior.mean, prior.root)
-    recording = posterior.recording
-    saturated = recording.saturated_gyroscopes()
-    collapsed = Collapsed.of(
-        posterior.model, recording.specific_force, recording.angular_rate, saturated
-    )
-    chi_square = apart(posterior.model, collapsed, recording.angular_rate, saturated)
-    size = 3 * (posterior.model.array.accelerometers - 1)
-    found = Marginal.of(
-        collapsed, positions_of(posterior.mode[:size]), motion_sd=posterior.model.motion_sd[:2],
-        spread=(chi_square, saturated.size - saturated.sum()), enough=SETTINGS.node_gap,
-    )  # fmt: skip
+    found = _marginal(posterior, posterior.motion)
     if found.gap > SETTINGS.node_gap:
         notify("gyroscopes that see little of the motion: the likelihood is good to"
             f" {found.gap:.1g} nats only")  # fmt: skip
     return log_posterior, (
         found.data, found.nodes, found.log_weights, spread, prior.mean, prior.sd
+    )  # fmt: skip
+
+
+def _marginal(posterior: Posterior, motion) -> Marginal:
+    """The papers' marginal likelihood of all samples, around the ``motion`` (T, 9) at the mode."""
+    recording, model = posterior.recording, posterior.model
+    noise, rate, saturated = model.noise, recording.angular_rate, recording.saturated_gyroscopes()
+    observed, information = noise.angular_rate_given_gyroscopes(rate, saturated)
+    force = recording.specific_force
+    force = force - force.mean(axis=1, keepdims=True)  # s takes it up; less is lost to rounding
+    apart = noise.misfit(np.zeros((len(rate), force[0].size)), rate - observed[:, None], saturated)
+    precision = noise.accelerometer_precision
+    weighted = force.reshape(len(force), -1) @ precision
+    covariance = np.linalg.inv(information + model.motion_sd[0] ** -2.0 * np.eye(3))
+    mean = np.einsum("tij,tjk,tk->ti", covariance, information, observed)
+    return Marginal.of(
+        weighted, np.sum(weighted * force.reshape(weighted.shape), axis=1), precision,
+        (mean, covariance), motion[:, :3],
+        positions_of(posterior.mode[: 3 * (model.array.accelerometers - 1)]), model.motion_sd[:2],
+        observed=observed, spread=(apart, saturated.size - saturated.sum()),
+        enough=SETTINGS.node_gap,
     )  # fmt: skip

@@ -8,15 +8,14 @@ import numpy as np
 
 from imuarray.analysis.model import Notify, silent
 from imuarray.analysis.settings import SETTINGS
-from imuarray.engine.derivatives import no_derivatives
+from imuarray.engine.estimate import Recorded, estimate
 from imuarray.engine.linearise import CHUNK, State, chunk_at
 from imuarray.engine.normal import pick
-from imuarray.engine.parameters import Columns, columns_of, model_of
+from imuarray.engine.parameters import POSITION, Columns, columns_of, model_of
 from imuarray.engine.readings import Readings, measured
-from imuarray.errors import IdentifiabilityError
-from imuarray.estimation.identifiability import Calibration
-from imuarray.estimation.newton import calibrate_gauss_newton
-from imuarray.model import ArrayModel, Noise
+from imuarray.engine.start import linear_motion, start
+from imuarray.linear import scaled_inverse
+from imuarray.model import Noise
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
@@ -37,9 +36,9 @@ def noise_estimate(
     few = active[:, wanted]
     samples, count = readings.values.shape[:2]
     squares, freedom, spread = np.zeros((count, 2)), np.zeros((count, 2)), []
-    for start in range(0, samples, CHUNK):
-        linearised = chunk_at(readings, columns, state, wanted, start)
-        keep = readings.keep[start : start + CHUNK]
+    for first in range(0, samples, CHUNK):
+        linearised = chunk_at(readings, columns, state, wanted, first)
+        keep = readings.keep[first : first + CHUNK]
         pairs, projected = pick(linearised.projected, few)
         for k in range(count):
             basis, own = linearised.basis[:, 6 * k : 6 * k + 6], np.flatnonzero(pairs[:, 0] == k)
@@ -89,34 +88,60 @@ def noise_of(readings: Readings) -> Noise:
     return Noise.of(*counts, *(readings.sd[:n, kind] for kind, n in enumerate(counts)))
 
 
-def mode_of(recording: Recording, model: ArrayModel, start=None) -> Calibration:
-    """The mode of the positions' posterior under the papers' model, searched from ``start`` (A, 3).
+class Mode(NamedTuple):
+    """The most likely positions of a recording under the papers' model, and its motion there."""
+
+    positions: np.ndarray  # (A, 3) m
+    covariance: np.ndarray  # (P, P) m^2 of r_2 ... r_A
+    state: State
+    cost: float  # twice the negative log posterior, up to a constant
+    converged: bool
+
+
+def as_declared(recording: Recording) -> tuple[Readings, Columns]:
+    """All samples with the noise that the recording declares, and the positions as parameters."""
+    model, prior_sd = model_of(recording), recording.position_prior_sd
+    data = recording.specific_force, recording.angular_rate, recording.saturated_gyroscopes()
+    readings = replace(measured(model, *data), position_prior_sd=prior_sd)
+    return readings, columns_of(model.array, (), prior_sd)
+
+
+def mode_of(readings: Readings, columns: Columns, begin=None) -> Mode:
+    """The mode of the positions' posterior with the readings' noise, searched from ``begin``.
 
     Without one from the nominal positions, and from others where few samples leave local optima.
     """
-
-    def search(begin):
-        return calibrate_gauss_newton(
-            model, recording.specific_force, recording.angular_rate, begin,
-            saturated=recording.saturated_gyroscopes(),
-            position_prior=(model.array.parameters, recording.position_prior_sd),
-        )  # fmt: skip
-
-    found = search(start)
-    if start is None and len(recording.time) <= SETTINGS.few:
-        rng = stream(0, "sample", "mode")
-        for _ in range(SETTINGS.starts):
-            off = recording.position_prior_sd * rng.standard_normal(found.positions.shape)
-            with suppress(IdentifiabilityError):  # it ran to triads on one line
-                other = search(model.array.relative + off)
-                found = min(found, other, key=lambda one: one.cost[-1])
+    found = _mode_from(readings, columns, begin)
+    if begin is not None or len(readings.time) > SETTINGS.few:
+        return found
+    rng, nominal = stream(0, "sample", "mode"), readings.array.relative
+    for _ in range(SETTINGS.starts):
+        off = readings.position_prior_sd * rng.standard_normal(nominal.shape)
+        with suppress(np.linalg.LinAlgError):  # it ran to triads on one line
+            other = _mode_from(readings, columns, nominal + off - off[0])
+            found = min(found, other, key=lambda one: one.cost)
     return found
+
+
+def _mode_from(readings: Readings, columns: Columns, begin) -> Mode:
+    state = start(readings, columns)
+    if begin is not None:
+        motion = np.hstack([
+            state.motion[:, :3], linear_motion(readings, begin, state.motion[:, :3])
+        ])  # fmt: skip
+        state = state._replace(positions=begin, motion=motion)
+    begun = [Recorded(readings, state, smooth=False)]
+    found = estimate(begun, columns, columns.mask([POSITION]), noise="given")
+    off = found.values - columns.prior_means()[found.active]
+    cost = np.sum(found.residuals[0].squares) + off @ found.precision @ off
+    covariance = scaled_inverse(found.information + found.precision)
+    return Mode(found.positions, covariance, found.recorded[0].state, float(cost), found.converged)
 
 
 def estimated_noise(
     recording: Recording, known: bool = False, notify: Notify = silent
-) -> tuple[ArrayModel, Calibration, NoiseEstimate]:
-    """The papers' model with the noise of each triad, its fit of a recording, and what that shows.
+) -> tuple[Readings, Mode, NoiseEstimate]:
+    """All readings with the noise of each triad, the mode with that, and what it shows.
 
     Restricted maximum likelihood: each triad's squared residuals against the degrees of freedom
     that motion and positions leave it, fit and noise by turns. Where those are few, or triads too
@@ -124,18 +149,11 @@ def estimated_noise(
 
     ``known``: whether the accelerometers' noise is the declared one.
     """
-    model, start = model_of(recording), None
-    columns = columns_of(model.array, (), recording.position_prior_sd)
-    readings = measured(
-        model, recording.specific_force, recording.angular_rate, recording.saturated_gyroscopes()
-    )
+    (readings, columns), begin = as_declared(recording), None
     for number in range(SETTINGS.rounds + 1):
-        found = mode_of(recording, model, start)
-        start = found.positions
-        motion = np.hstack(found.motion.motion[:3])
-        rest = no_derivatives(len(motion), len(found.positions))
-        state = State(motion, found.positions, np.empty(0), rest)
-        estimated = noise_estimate(readings, columns, state, columns.owner, found.covariance)
+        found = mode_of(readings, columns, begin)
+        begin = found.positions
+        estimated = noise_estimate(readings, columns, found.state, columns.owner, found.covariance)
         wrong = factors(estimated, readings.exists, known)
         if np.abs(np.log(wrong)).max() < SETTINGS.enough:
             break
@@ -143,5 +161,4 @@ def estimated_noise(
             notify("the estimates of noise and positions did not settle; the last ones are taken")
             break
         readings = readings.with_sd(readings.sd * wrong)
-        model = replace(model, noise=noise_of(readings))
-    return model, found, estimated
+    return readings, found, estimated

@@ -12,13 +12,15 @@ import xarray as xr
 from imuarray.analysis import methods
 from imuarray.analysis.model import Notify, silent
 from imuarray.engine.dataset import engine_dataset, with_readings
-from imuarray.engine.estimate import Estimate
+from imuarray.engine.estimate import Estimate, Recorded, estimate
 from imuarray.engine.forward import EffectGroup, groups_of, resumed, select_forward, with_effects
 from imuarray.engine.parameters import POSITION, columns_of, model_of
 from imuarray.engine.readings import Readings, arrange, determined, most_informative
 from imuarray.engine.start import start
-from imuarray.errors import InputError, one_line, require
+from imuarray.errors import IdentifiabilityError, InputError, one_line, require
 from imuarray.firstorder.rails import less_leak_by_others
+from imuarray.geometry.array import require_planar_extent
+from imuarray.linear import FLOOR, scaled_eigh
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording, load_dataset
 from imuarray.recording.channels import require_apart, require_live
@@ -70,6 +72,8 @@ def fitted(
         except InputError as error:
             raise InputError(f"--model {model}: {error}") from None
     readings = [used(one, notify) for one in recordings]
+    if model == "papers":
+        return positions_alone(readings[0]), []
     if effects:
         return with_effects(readings, effects), []
     if not plain and not groups_of(readings):
@@ -80,6 +84,23 @@ def fitted(
         gained = f"{group.gain:.3g} ({group.error:.2g}) nats on held-out time"
         notify(f"{group.name}: {verdict}, {gained}")
     return found if plain or any(group.kept for group in groups) else None, groups
+
+
+def positions_alone(readings: Readings) -> Estimate:
+    """The maximum of the papers' likelihood: positions and motion, the declared noise, no prior.
+
+    IdentifiabilityError where triads or motion leave a direction of the positions open.
+    """
+    require_planar_extent(readings.array.positions, "recording")
+    columns = columns_of(readings.array, (), np.inf)
+    begun = Recorded(readings, start(readings, columns), smooth=False)
+    found = estimate([begun], columns, columns.mask([POSITION]), noise="given")
+    if not scaled_eigh(found.information)[0][0] > FLOOR:
+        raise IdentifiabilityError(
+            "calibration: expected informative motion, found a direction of the positions that the"
+            " data do not determine"
+        )
+    return found
 
 
 def finished(dataset: xr.Dataset, recordings, model: str) -> xr.Dataset:

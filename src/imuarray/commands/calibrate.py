@@ -18,8 +18,7 @@ MISFIT = 1.5  # residual over declared noise from which it is spoken of
 
 def calibrate(arguments, output: Output) -> Answer:
     """Positions and motion by maximum likelihood; see `imuarray.calibrate` for the output."""
-    papers = arguments.model == "papers"
-    recordings = [read_recording(path, papers) for path in arguments.recordings]
+    recordings = [read_recording(path) for path in arguments.recordings]
     noise = arguments.accelerometer_noise
     dataset = calibrated(recordings, arguments.model, arguments.effects, noise, output.notify)
     return written(dataset, recordings, arguments)
@@ -52,8 +51,7 @@ def _informative(dataset: xr.Dataset) -> list[str]:
     worst, prior = weakest_of(dataset), dataset.attrs["position_prior_sd"]
     rms = np.sqrt(np.mean(position_sds(dataset)[1:] ** 2))
     said = ", ".join(f"{item.words} ({1e6 * item.sd:.2g} um)" for item in worst)
-    bound = " by the Cramer-Rao bound" if dataset.attrs["model"] == "papers" else ""
-    lines = [f"positions to {1e6 * rms:.2g} um rms{bound}; worst determined: {said}"]
+    lines = [f"positions to {1e6 * rms:.2g} um rms; worst determined: {said}"]
     if worst[0].sd > prior:
         lines.append(
             f"{worst[0].words}: determined worse than by the nominal positions,"

@@ -157,30 +157,35 @@ def _spared(share) -> np.ndarray:
 
 
 def estimate(
-    recorded: Sequence[Recorded], columns: Columns, active, robust: bool = True,
+    recorded: Sequence[Recorded], columns: Columns, active, noise: str = "robust",
     steps: int = SETTINGS.iterations,
 ) -> Estimate:  # fmt: skip
     """The most likely parameters from where the recordings stand.
 
-    ``active`` (N, m) bool. ``robust``: Student's t with estimated degrees of freedom instead of
-    normal noise. ``steps``: at most. LinAlgError where the readings do not determine the motion.
+    ``active`` (N, m) bool. ``noise``: "robust" is Student's t, its degrees of freedom and each
+    triad's scale estimated; "normal" is estimated, too; "given" is normal, of the readings' sds.
+    ``steps``: at most. LinAlgError where the readings do not determine the motion.
     """
     active = columns.movable(active, [one.state for one in recorded])
     places = places_of(columns, active, len(recorded))
     nu, length, moved, tails, trail, near = NORMAL, 1.0, [], [], [], False
     # from a former estimate: readings far out have little weight as it is
     weighted = all(one.readings.trust is not None for one in recorded)
-    first = 0 if weighted else SETTINGS.robust_first
+    first = 0 if weighted or noise == "given" else SETTINGS.robust_first
+    enough = SETTINGS.exact if noise == "given" else SETTINGS.settled
     for number in range(steps):
         far = number < first
         linear, seen = _linearised(recorded, columns, active, int(far))
-        if robust:
+        if noise == "robust":
             pairs = zip(linear, seen, strict=True)  # the least of all recordings' is all's
             nu = ROBUST if far else np.min([freedoms(x.readings, y) for x, y in pairs], axis=0)
             tails.append(nu)
             nu = steady(tails)
         # before the equations: weights of a step before would halve the pace
-        recorded, seen, change = _judged(recorded, linear, seen, columns, active, nu)
+        if noise == "given":
+            change = 0.0
+        else:
+            recorded, seen, change = _judged(recorded, linear, seen, columns, active, nu)
         recorded, equations = _solvable(recorded, linear, active)
         information, score, blocks = _summed(equations, places)
         precision = pinned(columns, active, places, shown=shown(recorded))
@@ -189,12 +194,13 @@ def estimate(
         precision = pinned(columns, active, places, shown=shown(recorded))
         slope = score - precision @ (values - means(recorded, columns, active, places))
         step, sds = scaled_solve(information + precision, slope)
-        sds = np.maximum(sds, jackknifed(information, precision, blocks))
+        if noise != "given":
+            sds = np.maximum(sds, jackknifed(information, precision, blocks))
         trail = [*trail, step / sds]
         length = paced(length, trail)
         farther = 1.0 if far or length < 1.0 else to_come(trail)
         moved.append(float(np.max(np.abs(step) / sds, initial=0.0)))
-        near = len(trail) > 1 and farther * moved[-1] < SETTINGS.settled
+        near = len(trail) > 1 and farther * moved[-1] < enough
         if near and change < SETTINGS.same_noise and number > first:
             break
         recorded = tuple(

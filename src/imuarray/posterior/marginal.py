@@ -10,7 +10,6 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from imuarray.estimation.collapsed import Collapsed, motion_from
 from imuarray.model import structure_tensor
 from imuarray.model.jax64 import cholesky, jax, jnp, log_determinant, solve_lower, solve_upper
 from imuarray.model.structure import CURVATURES, PAIRS
@@ -212,28 +211,26 @@ class Marginal:
 
     @classmethod
     def of(
-        cls, collapsed: Collapsed, positions, rates=None, motion_sd=(np.inf, np.inf),
-        nodes: int | None = None, spread=(0.0, 0), enough: float = SETTINGS.node_error,
+        cls, weighted, energy, precision, rates, start, positions, motion_sd=(np.inf, np.inf),
+        nodes: int | None = None, observed=None, spread=(0.0, 0),
+        enough: float = SETTINGS.node_error,
     ) -> Self:  # fmt: skip
-        """Marginal of a recording; modes are searched from those at ``positions`` (A, 3) m.
+        """Marginal of a recording of T samples, D = 3 A readings of accelerometers each.
 
-        ``rates``: p(omega | y_g), mean (T, 3) rad/s and covariance (T, 3, 3), by default
-        `Collapsed.rate_density`; ``motion_sd``: prior sds of omega (rad/s) and omega_dot
-        (rad/s^2); ``nodes`` on each axis of omega, by default the fewest of `NODE_COUNTS` that
-        differ by less than ``enough`` nats in total from the next, or the most: ``gap`` says. Two
-        poor gyroscopes already need more than three (tests). ``spread``: chi-square of the
-        gyroscopes about their mean and the number of their readings, which `scaled` needs.
+        ``weighted`` (T, D) Lambda y, ``energy`` (T,) y' Lambda y, ``precision`` (D, D) Lambda;
+        ``rates``: p(omega | y_g), mean (T, 3) rad/s and covariance (T, 3, 3); ``start`` (T, 3)
+        rad/s, where the search for the modes begins; ``motion_sd``: prior sds of omega (rad/s),
+        which ``rates`` have, and of omega_dot (rad/s^2). ``nodes`` on each axis of omega, by
+        default the fewest of `NODE_COUNTS` that at ``positions`` (A, 3) m differ by less than
+        ``enough`` nats in total from the next, or the most: ``gap`` says. Two poor gyroscopes
+        already need more than three (tests). For `scaled` alone: ``observed`` (T, 3) the
+        gyroscopes' own mean, ``spread`` chi-square about it and the number of readings.
         """
-        mean, covariance = collapsed.rate_density(motion_sd[0]) if rates is None else rates
-        relative = np.ascontiguousarray(np.asarray(positions, float) - positions[0])
-        start = motion_from(collapsed.with_rates(covariance, mean), relative).motion.angular_rate
-        weighted = collapsed.weighted.reshape(-1, collapsed.samples).T
+        mean, covariance = rates
         information = np.linalg.inv(covariance)
-        prior = float(motion_sd[0]) ** -2.0
-        observed = collapsed.mean.T if prior else mean
         parts = (
-            weighted, collapsed.energy, collapsed.precision, mean, information,
-            observed, prior, np.repeat([float(motion_sd[1]) ** -2.0, 0.0], 3), start,
+            weighted, energy, precision, mean, information, mean if observed is None else observed,
+            float(motion_sd[0]) ** -2.0, np.repeat([float(motion_sd[1]) ** -2.0, 0.0], 3), start,
             0.5 * np.sum(np.linalg.slogdet(information)[1]), np.array(spread, float),
         )  # fmt: skip
         data = MarginalData(*map(jnp.asarray, parts))

@@ -19,11 +19,9 @@ _PLACE = ("accelerometer", "axis")
 # Variables by whether they are needed: always, with effects, or not at all.
 _ALWAYS = {
     "position": _PLACE, "position_covariance": (*_PLACE, "accelerometer_other", "axis_other"),
+    "accelerometer_sd": _PLACE, "gyroscope_sd": ("gyroscope", "axis"),
 }  # fmt: skip
-_WITH_EFFECTS = {
-    "effect_parameter": ("parameter",), "accelerometer_sd": _PLACE,
-    "gyroscope_sd": ("gyroscope", "axis"),
-}  # fmt: skip
+_WITH_EFFECTS = {"effect_parameter": ("parameter",)}
 _PERHAPS = {
     "nominal_position": _PLACE, "whole_covariance": ("unknown", "unknown_other"),
     **{name: DIMENSIONS[name] for name in MATRICES},

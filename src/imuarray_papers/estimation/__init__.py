@@ -1,1 +1,1 @@
-"""ML-BCD, the search of paper 2017."""
+"""Positions and motion under the papers' model, compiled: ML-BCD and Gauss-Newton."""

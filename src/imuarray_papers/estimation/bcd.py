@@ -2,12 +2,17 @@
 
 import numpy as np
 
-from imuarray.compiled import njit
-from imuarray.estimation import kernels
-from imuarray.estimation.collapsed import motion_from
-from imuarray.estimation.identifiability import Calibration, arranged, explain, require_rotation
-from imuarray.estimation.rates import most_likely, workspace
 from imuarray.model import ArrayModel
+from imuarray_papers.compiled import njit
+from imuarray_papers.estimation import kernels
+from imuarray_papers.estimation.collapsed import motion_from
+from imuarray_papers.estimation.identifiability import (
+    Calibration,
+    arranged,
+    explain,
+    require_rotation,
+)
+from imuarray_papers.estimation.rates import most_likely, workspace
 
 
 @njit

@@ -61,7 +61,7 @@ def _fits(readings) -> Iterator[tuple[str, Estimate, tuple[float, float]]]:
     apart = replace(columns, common_sd=np.zeros(columns.size))
     begun, nothing = [Recorded.of(readings, columns)], (np.nan, np.nan)
     placed = columns.mask([POSITION])
-    yield "normal", estimate(begun, columns, placed, robust=False), nothing
+    yield "normal", estimate(begun, columns, placed, noise="normal"), nothing
     robust = Selected(estimate(begun, apart, placed), (readings.keep,), {})
     yield "robust", robust.found, nothing
     yield "no clocks", *_more(robust, [LAG, GYROSCOPES, ARMS])[1:]

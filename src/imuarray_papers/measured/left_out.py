@@ -83,7 +83,7 @@ def predicted(recording: Recording, calibration: xr.Dataset) -> pd.DataFrame:
     placed = columns_of(readings.array, (), readings.position_prior_sd)
     active, begun = placed.mask([POSITION]), [Recorded.of(readings, placed)]
     fits = {
-        "inflated": estimate(begun, placed, active, robust=False),
+        "inflated": estimate(begun, placed, active, noise="normal"),
         "heavy": estimate(begun, placed, active),
         "board": board,
         "own": estimate(board.recorded, board.columns, every),

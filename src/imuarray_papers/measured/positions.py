@@ -7,13 +7,13 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtri
 
-from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.newton import calibrate_gauss_newton
 from imuarray.model import ArrayModel
 from imuarray.model.structure import product_slopes
 from imuarray.recording import Recording, array_of
 from imuarray.simulation.recordings import simulate_samples
 from imuarray_papers.estimation.bcd import calibrate_bcd
+from imuarray_papers.estimation.collapsed import Collapsed
+from imuarray_papers.estimation.newton import calibrate_gauss_newton
 from imuarray_papers.posterior.proposals import rate_distribution
 
 TOLERANCE = 1e-3  # of a position's own sd

@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 
 from imuarray.engine.parameters import model_of
-from imuarray.estimation.identifiability import Calibration
-from imuarray.estimation.newton import calibrate_gauss_newton
 from imuarray.model.array_model import Prediction
 from imuarray.recording import Recording
 from imuarray.simulation.recordings import clip, measure
+from imuarray_papers.estimation.identifiability import Calibration
+from imuarray_papers.estimation.newton import calibrate_gauss_newton
 from imuarray_papers.measured.positions import LIMIT
 
 # The shape of the picture, not the positions' last micrometre, is wanted.

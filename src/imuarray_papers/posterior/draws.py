@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.compiled import fma, njit
+from imuarray_papers.compiled import fma, njit
 from imuarray_papers.posterior import normals
 from imuarray_papers.posterior.normals import exp
 

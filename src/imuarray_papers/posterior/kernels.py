@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.compiled import njit
-from imuarray.estimation import kernels
-from imuarray.estimation.collapsed import Collapsed
+from imuarray_papers.compiled import njit
+from imuarray_papers.estimation import kernels
+from imuarray_papers.estimation.collapsed import Collapsed
 from imuarray_papers.posterior import draws
 
 

@@ -6,11 +6,11 @@ from typing import Self
 import numpy as np
 
 from imuarray.errors import InputError, require_one_of, require_shape
-from imuarray.estimation.collapsed import Collapsed
 from imuarray.geometry import positions_of
 from imuarray.model import ArrayModel
 from imuarray.posterior.marginal import Marginal
 from imuarray.posterior.prior import GaussianPrior
+from imuarray_papers.estimation.collapsed import Collapsed, motion_from
 from imuarray_papers.posterior import kernels
 from imuarray_papers.posterior.proposals import log_weights, proposals
 
@@ -64,12 +64,18 @@ class Likelihood:
         )  # fmt: skip
         return cls(data, DETERMINANTS[determinant], collapsed, mean.T, covariance, motion_sd)
 
-    def marginal(self, positions, nodes: int | None = None) -> Marginal:
-        """The limit of `estimate`, without Monte Carlo noise (`Marginal.of`)."""
+    def marginal(self, positions, nodes: int | None = None, spread=(0.0, 0)) -> Marginal:
+        """The limit of `estimate`, without Monte Carlo noise; options as for `Marginal.of`."""
         if self.power != DETERMINANTS["derived"]:
             raise InputError("marginal: expected the derived determinant, found the printed one")
-        rates = self.rate_mean, self.rate_covariance
-        return Marginal.of(self.collapsed, positions, rates, self.motion_sd, nodes)
+        rates, data = (self.rate_mean, self.rate_covariance), self.collapsed
+        given = data.with_rates(self.rate_covariance, self.rate_mean)
+        relative = self._relative(positions)
+        return Marginal.of(
+            data.weighted.reshape(-1, data.samples).T, data.energy, data.precision, rates,
+            motion_from(given, relative).motion.angular_rate, relative, self.motion_sd, nodes,
+            data.mean.T if np.isfinite(self.motion_sd[0]) else None, spread,
+        )  # fmt: skip
 
     def centred(self, positions) -> Self:
         """The likelihood estimated with draws from where its integrand is.

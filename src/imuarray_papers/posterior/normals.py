@@ -6,7 +6,7 @@ draw of omega cost.
 
 The elementary functions that this needs have no branch and no call: numbers are taken apart into
 2^k m, and series do the rest, to an ulp or two. Processors with a fused multiply-add
-(`imuarray.compiled.fma`) give the same bits, others differ in the last one.
+(`imuarray_papers.compiled.fma`) give the same bits, others differ in the last one.
 """
 
 import math
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.compiled import as_bits, as_number, fma, njit
+from imuarray_papers.compiled import as_bits, as_number, fma, njit
 
 ONE = np.uint64(0x3FF0000000000000)  # the bits of 1.0
 ROOT_HALF = np.uint64(0x3FE6A09E667F3BCD)  # the bits of sqrt(1/2)

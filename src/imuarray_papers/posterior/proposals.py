@@ -3,9 +3,9 @@
 import numpy as np
 
 from imuarray.errors import InputError
-from imuarray.estimation.collapsed import Collapsed, motion_from
 from imuarray.model.structure import CURVATURES, PAIRS, product_slopes, products
 from imuarray.recording import Recording
+from imuarray_papers.estimation.collapsed import Collapsed, motion_from
 
 FEWEST = 4  # gyroscopes for a covariance (3, 3) of full rank
 # Of draws, times what the curvature at the mode says, so that no weight is without bound in

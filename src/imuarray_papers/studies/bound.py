@@ -5,9 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.information import arms, information_at
-from imuarray.estimation.newton import fisher_scoring
 from imuarray.geometry import Array, sub_array
 from imuarray.linear import scaled_eigh
 from imuarray.model import ArrayModel
@@ -15,6 +12,9 @@ from imuarray.model.structure import products
 from imuarray.motion import normal_motion, sphere_motion
 from imuarray.streams import stream
 from imuarray_papers.estimation.bcd import calibrate_bcd
+from imuarray_papers.estimation.collapsed import Collapsed
+from imuarray_papers.estimation.information import arms, information_at
+from imuarray_papers.estimation.newton import fisher_scoring
 from imuarray_papers.studies.settings import SETTINGS
 from imuarray_papers.studies.truths import in_batches, realisations, root_mean_square, run_batches
 

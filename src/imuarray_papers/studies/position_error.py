@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from imuarray.estimation.collapsed import Collapsed
 from imuarray.model import ArrayModel
 from imuarray_papers.estimation.bcd import block_descent
+from imuarray_papers.estimation.collapsed import Collapsed
 from imuarray_papers.studies.truths import in_batches, realisations, root_mean_square
 
 

@@ -5,9 +5,9 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from imuarray.estimation.collapsed import estimate_motion
 from imuarray.model import ArrayModel
 from imuarray.streams import stream
+from imuarray_papers.estimation.collapsed import estimate_motion
 from imuarray_papers.studies.truths import in_batches, realisations, root_mean_square
 
 

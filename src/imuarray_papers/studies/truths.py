@@ -7,8 +7,6 @@ import numpy as np
 from tqdm import tqdm
 
 from imuarray.errors import IdentifiabilityError
-from imuarray.estimation.identifiability import Calibration
-from imuarray.estimation.newton import fisher_scoring
 from imuarray.geometry import positions_of, sub_array
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion, sphere_motion
@@ -16,6 +14,8 @@ from imuarray.posterior.prior import GaussianPrior
 from imuarray.simulation.recordings import measure
 from imuarray.streams import stream
 from imuarray_papers.config import model_from, motion_sds
+from imuarray_papers.estimation.identifiability import Calibration
+from imuarray_papers.estimation.newton import fisher_scoring
 from imuarray_papers.posterior.likelihood import Likelihood
 from imuarray_papers.studies.settings import SETTINGS
 

@@ -6,7 +6,6 @@ The Fisher information is from the model's structure tensor alone.
 import numpy as np
 import pandas as pd
 
-from imuarray.estimation.collapsed import estimate_motion
 from imuarray.model import structure_tensor
 from imuarray.model.structure import design, product_slopes, products
 from imuarray.motion import Motion, sphere_motion
@@ -14,6 +13,7 @@ from imuarray.motion.state import directions
 from imuarray.recording.units import GRAVITY
 from imuarray.simulation.recordings import measure
 from imuarray_papers.estimation.bcd import calibrate_bcd
+from imuarray_papers.estimation.collapsed import estimate_motion
 
 LEAST = 1e-9  # of the largest singular value: what counts for a rank
 

@@ -6,15 +6,15 @@ import numpy as np
 import pandas as pd
 
 from imuarray.engine.parameters import model_of
-from imuarray.estimation.collapsed import estimate_motion
-from imuarray.estimation.information import information_at
-from imuarray.estimation.newton import calibrate_gauss_newton
 from imuarray.geometry import sub_array
 from imuarray.model import ArrayModel
 from imuarray.motion import Motion, hand_twisting, normal_motion, sphere_motion
 from imuarray.recording import Recording
 from imuarray.simulation.recordings import measure
 from imuarray.streams import stream
+from imuarray_papers.estimation.collapsed import estimate_motion
+from imuarray_papers.estimation.information import information_at
+from imuarray_papers.estimation.newton import calibrate_gauss_newton
 from imuarray_papers.studies.bound import isotropic, rms_width, widths
 from imuarray_papers.studies.checks.identifiability import motion_jacobian
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.compiled import njit
+from imuarray_papers.compiled import njit
 
 # For sums over samples only: the compiler may then add in vectors. Elsewhere the order as written,
 # or results would depend on whether a kernel was compiled or came from the cache.

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from imuarray.errors import IdentifiabilityError, InputError, require_shape
-from imuarray.estimation.collapsed import Collapsed, motion_from
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel
 from imuarray.motion.state import MotionEstimate
+from imuarray_papers.estimation.collapsed import Collapsed, motion_from
 
 
 @dataclass(frozen=True)

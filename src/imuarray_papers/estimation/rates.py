@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.compiled import njit
-from imuarray.estimation.kernels import Reduced, collapse, linear_motion, quadratic, reduced
+from imuarray_papers.compiled import njit
+from imuarray_papers.estimation.kernels import Reduced, collapse, linear_motion, quadratic, reduced
 
 TOGETHER = 4  # steps of all samples at once, before what is left goes one by one
 

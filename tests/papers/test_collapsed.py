@@ -8,14 +8,14 @@ from hypothesis.extra.numpy import arrays
 from scipy.special import logsumexp
 
 from imuarray.errors import InputError
-from imuarray.estimation.collapsed import Collapsed, estimate_motion
-from imuarray.estimation.newton import calibrate_gauss_newton
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
 from imuarray.simulation.recordings import measure
 from imuarray_papers import reference
 from imuarray_papers.estimation.bcd import calibrate_bcd
+from imuarray_papers.estimation.collapsed import Collapsed, estimate_motion
+from imuarray_papers.estimation.newton import calibrate_gauss_newton
 from imuarray_papers.posterior import draws, kernels
 from imuarray_papers.posterior.likelihood import Likelihood
 from imuarray_papers.reference import linear_part, nonlinear_part

@@ -10,15 +10,15 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg
 
-from imuarray.compiled import njit
 from imuarray.errors import IdentifiabilityError, require_shape
-from imuarray.estimation.collapsed import Collapsed, motion_estimate
-from imuarray.estimation.identifiability import Calibration, arranged, require_rotation
-from imuarray.estimation.information import fisher, information_at, slope
-from imuarray.estimation.rates import Work, most_likely, workspace
 from imuarray.linear import FLOOR, scaled_eigh, scaled_inverse
 from imuarray.model import ArrayModel
 from imuarray.threads import one_thread
+from imuarray_papers.compiled import njit
+from imuarray_papers.estimation.collapsed import Collapsed, motion_estimate
+from imuarray_papers.estimation.identifiability import Calibration, arranged, require_rotation
+from imuarray_papers.estimation.information import fisher, information_at, slope
+from imuarray_papers.estimation.rates import Work, most_likely, workspace
 
 FAR = 5.0  # length of the step before: the information is computed anew after a longer one
 SLOW = 0.05  # of the step before: and where steps contract less than so

@@ -6,11 +6,11 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from imuarray.errors import IdentifiabilityError, InputError, require_shape
-from imuarray.estimation import kernels
-from imuarray.estimation.rates import most_likely, workspace
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel, structure_tensor
 from imuarray.motion.state import Motion, MotionEstimate
+from imuarray_papers.estimation import kernels
+from imuarray_papers.estimation.rates import most_likely, workspace
 
 TOLERANCE = 1e-10  # relative, of a step of omega from which a sample's search ends
 

@@ -5,13 +5,13 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from imuarray.errors import IdentifiabilityError, InputError
-from imuarray.estimation import newton
-from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.information import arms, fisher, information_at
-from imuarray.estimation.newton import calibrate_gauss_newton, fisher_scoring
 from imuarray.model import ArrayModel, Noise
 from imuarray.model.structure import products
 from imuarray.threads import one_thread
+from imuarray_papers.estimation import newton
+from imuarray_papers.estimation.collapsed import Collapsed
+from imuarray_papers.estimation.information import arms, fisher, information_at
+from imuarray_papers.estimation.newton import calibrate_gauss_newton, fisher_scoring
 from tests import oracles
 from tests.cases import measure, noises, simulate, small_array
 from tests.papers.test_bcd import problem, solution

@@ -8,12 +8,12 @@ of what the motion takes up: sums over samples of 12 x 12, however many triads t
 
 import numpy as np
 
-from imuarray.compiled import njit
-from imuarray.estimation import kernels
-from imuarray.estimation.collapsed import Collapsed, tables
-from imuarray.estimation.rates import lower, precision_at, rate_information
 from imuarray.model import ArrayModel
 from imuarray.model.structure import products
+from imuarray_papers.compiled import njit
+from imuarray_papers.estimation import kernels
+from imuarray_papers.estimation.collapsed import Collapsed, tables
+from imuarray_papers.estimation.rates import lower, precision_at, rate_information
 
 TILE = 128  # samples at a time
 

@@ -5,10 +5,10 @@ import pytest
 from scipy.optimize import least_squares
 
 from imuarray.errors import IdentifiabilityError
-from imuarray.estimation import rates
-from imuarray.estimation.collapsed import Collapsed, estimate_motion
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel, Noise
+from imuarray_papers.estimation import rates
+from imuarray_papers.estimation.collapsed import Collapsed, estimate_motion
 from tests import oracles
 from tests.cases import measure, noises, random_covariance, simulate, small_array
 from tests.oracles import most_likely_motion

@@ -1,1 +1,0 @@
-"""Maximum likelihood: motion given positions, and positions with the motion."""
