@@ -9,11 +9,17 @@ import hashlib
 from functools import cache, partial
 from pathlib import Path
 
-import numba
-from llvmlite import ir
-from numba.extending import intrinsic
-
 from imuarray.caches import cache_folder
+from imuarray.errors import InputError
+
+try:
+    import numba
+    from llvmlite import ir
+    from numba.extending import intrinsic
+except ModuleNotFoundError as error:
+    raise InputError(
+        f"the papers' kernels: expected {error.name} (pip install 'imuarray[papers]'), found none"
+    ) from None
 
 PACKAGE = Path(__file__).parent
 

@@ -57,9 +57,11 @@ def reasons_of_calibration(
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
         for reason, whose in found.items()
     ]
-    reasons += _moved_maps(calibration) + changed(calibration)
-    reasons += _grows(calibration) + _arms(calibration)
-    if not reasons:
+    own = not is_papers(calibration)  # what that model misses looks like anything
+    if own:
+        reasons += _moved_maps(calibration) + changed(calibration)
+        reasons += _grows(calibration) + _arms(calibration)
+    if own and not reasons:
         corrected = all(one.correction is not None for one in several)
         reasons = unsteady(calibration, corrected, len(several))
     root = little or any(map(UNIT.search, found))
