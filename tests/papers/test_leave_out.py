@@ -28,7 +28,7 @@ def densities(plain, freedoms):
 
 @pytest.fixture(scope="module")
 def plain():
-    return fitted(simulated(2.0)[0], robust=False)
+    return fitted(simulated(2.0)[0], noise="normal")
 
 
 def test_scores_of_normal_noise_are_those_of_the_diagnosis(plain):
