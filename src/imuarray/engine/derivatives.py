@@ -1,8 +1,10 @@
 """Time derivatives of a fitted motion, by local polynomials."""
 
+from functools import cache
 from math import factorial
 
 import numpy as np
+from scipy.ndimage import correlate1d
 
 from imuarray.engine.readings import Readings, odd_window, run_lengths
 from imuarray.engine.settings import SETTINGS
@@ -18,20 +20,21 @@ def derivatives(readings: Readings, motion, positions) -> tuple:
     would only amplify their noise. By quartics, whose noise is independent of the residual's.
     """
     rate, turn, force = motion[:, :3], motion[:, 3:6], motion[:, 6:9]
-    ideal = lever(rate[:, None], turn[:, None], positions) + force[:, None]
+    # an ideal reading is linear in its place: of as many triads as there are axes, and the first
+    ideal = np.stack([force, *lever(rate[:, None], turn[:, None], np.eye(3)).swapaxes(0, 1), rate])
 
     def along(values, order, window=readings.window, ends=None):
         time, run = readings.time, readings.run
         return polynomial_derivative(time, run, values, window, order, ends=ends)
 
     def both(*how):
-        return [
-            Prediction(along(ideal, order, *how), along(rate, order, *how)[:, None])
-            for order in (2, 3)
-        ]
+        for order in (2, 3):
+            first, *arms, turned = along(ideal.swapaxes(0, 1), order, *how).swapaxes(0, 1)
+            placed = first[:, None] + np.tensordot(positions, np.stack(arms), 1).swapaxes(0, 1)
+            yield Prediction(placed, turned[:, None])
 
     # at the ends of so long a window a quartic's third derivative has even the wrong sign
-    longer, short = odd_window(readings.time, SETTINGS.slow_window), both()
+    longer, short = odd_window(readings.time, SETTINGS.slow_window), [*both()]
     most = np.mean(run_lengths(readings.run) >= longer) > SETTINGS.most_gaps
     slow = both(longer, 3) if most else short
     return along(rate, 2), along(force, 1), *short, Slow(*slow)
@@ -42,30 +45,25 @@ def polynomial_derivative(time, run, values, window, order, degree=4, ends=None)
 
     Zero in runs shorter than the window; ``degree``: of other polynomials, ``ends``: of the ends'.
     """
-    step, middle = np.median(np.diff(time)), window // 2
-    degrees = [degree if ends is None or place == middle else ends for place in range(window)]
-    taps = [
+    step, half = np.median(np.diff(time)), window // 2
+    degrees = [degree if ends is None or place == half else ends for place in range(window)]
+    taps = np.array([
         polynomial_taps(window, place, order, each) / step**order
         for place, each in enumerate(degrees)
-    ]
-    out = np.zeros_like(values)
-    half = window // 2
+    ])  # fmt: skip
+    flat, place = np.reshape(values, (len(values), -1)), np.arange(window)
+    out = correlate1d(flat, taps[half], axis=0, mode="constant")
     edges = np.flatnonzero(np.concatenate([[True], np.diff(run) > 0, [True]]))
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
-        if last - first < window:
-            continue
-        middle = last - window + 1
-        out[first + half : last - half] = sum(
-            tap * values[first + i : middle + i] for i, tap in enumerate(taps[half])
-        )
-        for pos in range(half):
-            out[first + pos] = np.tensordot(taps[pos], values[first : first + window], 1)
-            out[last - half + pos] = np.tensordot(
-                taps[half + 1 + pos], values[last - window : last], 1
-            )
-    return out
+    first, last = edges[:-1], edges[1:]
+    long = last - first >= window
+    out[np.repeat(~long, last - first)] = 0.0
+    for begin, rows in ((first, slice(half)), (last - window, slice(half + 1, window))):
+        whole = begin[long, None] + place
+        out[whole[:, rows]] = np.einsum("pw,rwc->rpc", taps[rows], flat[whole], optimize=True)
+    return out.reshape(np.shape(values))
 
 
+@cache
 def polynomial_taps(window, place, order, degree) -> np.ndarray:
     """(window,) weights that give a least-squares polynomial's derivative at a place, unit steps.
 
