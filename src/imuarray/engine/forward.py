@@ -198,21 +198,34 @@ class Selected(NamedTuple):
 
     @property
     def active(self) -> np.ndarray:
-        """Parameters (N, m) of the positions and of what is kept, each direction of time once."""
+        """Parameters (N, m) of the positions and of what is kept.
+
+        A clock has an offset, which with one of its gyroscope its accelerometer's lag would be.
+        """
         columns = self.found.columns
         found = np.any([columns.mask([POSITION]), *self.kept.values()], axis=0)
-        imus, gyroscopes = (
-            (found & columns.mask(names)).any(axis=1, keepdims=True)
-            for names in (("sensor_delay", CLOCK), EFFECT_GROUPS[LAG])
-        )
-        # an accelerometer's lag is its IMU's delay, less as much of its gyroscope's
-        lag = columns.mask(EFFECT_GROUPS[OWN]) & [place == (0,) for place in columns.places]
-        return found & ~(lag & imus & gyroscopes)
+        if not {OWN, LAG} <= self.kept.keys():
+            return found
+        clocked = (found & columns.mask([CLOCK])).any(axis=1, keepdims=True)
+        return found & ~(self._first(OWN) & clocked)
+
+    def _first(self, group: str) -> np.ndarray:
+        """(N, m) bool of a group's shift of time: its first parameter of each IMU."""
+        columns = self.found.columns
+        return columns.mask(EFFECT_GROUPS[group]) & [p == (0,) or not p for p in columns.places]
+
+    @property
+    def freed(self) -> dict[str, np.ndarray]:
+        """The parameters (N, m) of each group that is kept which are `active`."""
+        return {name: mask & self.active for name, mask in self.kept.items()}
 
     def with_kept(self, names) -> Self:
-        """With more groups kept."""
+        """With more groups kept; lags of each accelerometer and gyroscope say what delays do."""
         new = {name: self.found.columns.mask(EFFECT_GROUPS[name]) for name in names}
-        return self._replace(kept=new | self.kept)
+        kept = new | self.kept
+        if {OWN, LAG} <= kept.keys():
+            kept.pop(DELAYS, None)
+        return self._replace(kept=kept)
 
     def without(self, names) -> Self:
         """Without some of those kept, their parameters back at zero."""
@@ -220,22 +233,27 @@ class Selected(NamedTuple):
         return now._replace(found=replace(self.found, recorded=now._emptied()))
 
     def _emptied(self) -> tuple[Recorded, ...]:
-        """The recordings, with what was fitted and is no more at zero."""
+        """The recordings, with what was fitted and is no more at zero, delays in lags instead."""
         found, recorded = self.found, []
+        gone = found.active & ~self.active
         for one in found.recorded:
             whole = found.columns.flat(one.state)
-            whole[found.active & ~self.active] = 0.0
+            if {OWN, LAG} <= self.kept.keys():
+                late = np.sum(whole * (gone & self._first(DELAYS)), axis=1, keepdims=True)
+                whole += late * (self.active & (self._first(OWN) | self._first(LAG)))
+            whole[gone] = 0.0
             recorded.append(replace(one, state=found.columns.unflat(one.state, whole)))
         return tuple(recorded)
 
     def tried(self, names) -> list[EffectGroup]:
-        """Gains of the groups, but those of which a clock is the whole, and `_with_slope`'s."""
+        """Gains of the groups, but of those that others say, and `_with_slope`'s."""
         part = {CLOCK, *EFFECTS[CLOCK].contains} if CLOCKS in self.kept else {CLOCK}
+        part |= {*EFFECT_GROUPS[DELAYS]} if {OWN, LAG} <= self.kept.keys() else set()
         asked = [n for n in names if n != CURVE and not set(EFFECT_GROUPS[n]) <= part]
-        masks = {name: self.found.columns.mask(EFFECT_GROUPS[name]) for name in asked}
+        masks = {name: self.with_kept([name]).freed[name] for name in asked}
         # a pair's filter takes up what a delay leaves: it is for `needed` to say
         pair = self.found.recorded[0].readings.pair
-        return gains(self.found, masks, self.kept, FILTER if pair else "")
+        return gains(self.found, masks, self.freed, FILTER if pair else "")
 
     def needed(self, names, kept) -> list[str]:
         """Groups that the estimate of one of those ``kept`` calls for.
@@ -259,7 +277,7 @@ class Selected(NamedTuple):
         )
         now = self._replace(found=replace(self.found, recorded=hinted))
         mask = columns.mask([CLOCK], imus)
-        group = gains(now.found, {CLOCKS: mask}, self.kept)[0]
+        group = gains(now.found, {CLOCKS: mask}, self.freed)[0]
         return (now._replace(kept={CLOCKS: mask} | self.kept) if group.kept else self), [group]
 
     def clocks_beside_delays(self) -> bool:
@@ -270,8 +288,14 @@ class Selected(NamedTuple):
         return any(shown_clocks(one, found.columns) for one in found.recorded)
 
     def fitted(self, steps: int = SETTINGS.iterations) -> Self:
-        """With all that is kept estimated, each reading in its clock's turn."""
+        """With all that is kept estimated, each reading in its clock's turn.
+
+        In smooth motion from equal weights: those of a model that missed something keep the tails
+        that it had.
+        """
         columns, recorded = self.found.columns, self._emptied()
+        if all(one.smooth for one in recorded):
+            recorded = tuple(replace(one, readings=one.readings.unweighted()) for one in recorded)
         if CLOCKS in self.kept:
             imus = np.flatnonzero(self.kept[CLOCKS].any(axis=1))
             recorded = [

@@ -139,6 +139,10 @@ class Readings:
             sd[own, kind] = np.sqrt(np.mean(sd[own, kind] ** 2))
         return replace(self, sd=sd, trust=trust)
 
+    def unweighted(self) -> Self:
+        """The readings with the same say each, where a robust loss had weighed them."""
+        return self if self.trust is None else replace(self, trust=np.ones_like(self.trust))
+
     def without(self, lost) -> Self:
         """The readings without those in ``lost`` (T, N, 6) bool."""
         return replace(self, keep=self.keep & ~lost)
