@@ -47,7 +47,7 @@ $(READY): requirements.lock pyproject.toml
 install:
 	@test -e $(READY) || { set -e; test -x $(BIN)/python || $(PYTHON) -m venv $(VENV); \
 	  grep -oE '^[A-Za-z0-9_.-]+==[^\]*' requirements.lock > $(VENV)/versions.txt; \
-	  $(BIN)/python -m pip install --quiet --disable-pip-version-check -c $(VENV)/versions.txt '.[ros]'; }
+	  $(BIN)/python -m pip install --quiet --disable-pip-version-check -c $(VENV)/versions.txt '.[ros,papers]'; }
 	@echo "$(CURDIR)/$(BIN)/imuarray board log.csv --columns columns.yaml --gravity 9.81 --out answer/"
 
 run: $(READY)

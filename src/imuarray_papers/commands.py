@@ -12,7 +12,7 @@ from imuarray_papers.sampling import sample as sampled
 
 
 def calibrate(arguments, output: Output) -> Answer:
-    """Positions by ML-BCD; `imuarray calibrate --model papers` finds the same faster."""
+    """Positions by ML-BCD; off the rails `imuarray calibrate --model papers` finds the same."""
     recording = read_recording(arguments.recording)
     dataset = calibrated(recording, arguments.accelerometer_noise, output.notify)
     arguments.recordings = [arguments.recording]

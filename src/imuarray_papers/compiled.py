@@ -74,7 +74,7 @@ def as_bits(typing, number):
 
 
 def kernels_digest() -> str:
-    """SHA-256, in hexadecimal, of the files that have kernels, the papers' among them."""
+    """SHA-256, in hexadecimal, of the files that have kernels."""
     files = sorted(PACKAGE.parent.glob(f"{PACKAGE.name}*/**/*.py"))
     texts = ((path, path.read_bytes()) for path in files)
     found = hashlib.sha256()

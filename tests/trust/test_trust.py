@@ -161,12 +161,6 @@ MISTAKES = {
             ).as_matrix()
         ), "turned by 37 degrees: are the sensors in the drawing's frame?",
     ),
-    "hardly any motion": (
-        lambda r: replace(
-            r, angular_rate=np.random.default_rng(0).normal(0, 1e-3, r.angular_rate.shape),
-            specific_force=np.random.default_rng(1).normal(0, 0.04, r.specific_force.shape),
-        ), "says little of the positions",
-    ),
 }  # fmt: skip
 REFUSED = {
     "a constant channel": (
@@ -175,6 +169,12 @@ REFUSED = {
     "an IMU given twice": (
         lambda r: replace(r, specific_force=r.specific_force[:, [0, 1, 2, 2, 4, 5, 6, 7]]),
         "accelerometer '4' reads what '3' reads",
+    ),
+    "hardly any motion": (
+        lambda r: replace(
+            r, angular_rate=np.random.default_rng(0).normal(0, 1e-3, r.angular_rate.shape),
+            specific_force=np.random.default_rng(1).normal(0, 0.04, r.specific_force.shape),
+        ), "expected rotation",
     ),
 }  # fmt: skip
 

@@ -25,8 +25,8 @@ def calibrate(
     model
         ``"sensors"``: the standard sensor model, each part kept where it gains on held-out time,
         with noise estimated for each triad; ``"papers"``: that of paper 2017, positions and motion
-        alone, with the declared noise; or the path of a calibration: its effects and sensors,
-        estimated again.
+        alone, with the declared noise, from all samples off the gyroscopes' rails; or the path of
+        a calibration: its effects and sensors, estimated again.
     effects
         Names of effects (docs/effects.md) to have in the model instead of those of ``model``.
     accelerometer_noise

@@ -6,9 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from imuarray.analysis import methods
-from imuarray.errors import LARGEST, SMALLEST, InputError, require
+from imuarray.engine.linearise import State
+from imuarray.engine.readings import Readings
+from imuarray.errors import LARGEST, SMALLEST, IdentifiabilityError, InputError, require
 from imuarray.geometry.array import require_planar_extent
+from imuarray.linear import scaled_inverse
 from imuarray.model.effects import find_effects
+from imuarray.model.structure import design
+from imuarray.motion.rotation import require_rotation
 from imuarray.recording import Recording
 from imuarray.recording.channels import require_live
 
@@ -49,6 +54,32 @@ def usable(recording: Recording, notify: Notify = silent) -> Recording:
         lost = lost | still
         require(not lost.all(), "recording", "moving samples", "still poses only")
     return recording.select(~lost) if lost.any() else recording
+
+
+def require_seen(readings: Readings) -> None:
+    """IdentifiabilityError where in some sample an axis has no gyroscope off its rail."""
+    blind = np.flatnonzero(~np.all(np.any(readings.keep[..., 3:], axis=1), axis=1))
+    if blind.size:
+        raise IdentifiabilityError(
+            "gyroscopes: expected one unsaturated per axis in every sample, found none in sample"
+            f" {blind[0]} (and {blind.size - 1} more)"
+        )
+
+
+def require_motion(readings: Readings, state: State) -> None:
+    """IdentifiabilityError where the motion is about one axis (Lemma 1), or hardly any.
+
+    ``state``: as `engine.start.start` has it.
+    """
+    kinds = [readings.exists[:, kind] for kind in range(2)]
+    force, rate = (readings.sd[own, kind] ** -2.0 for kind, own in enumerate(kinds))
+    rows = design(state.positions)[:, 6:]
+    inverse = scaled_inverse(rows.T @ (np.repeat(force, 3)[:, None] * rows))
+
+    def turning():
+        return state.motion[:, 3:6], np.sqrt(np.max(np.diag(inverse)[:3]))
+
+    require_rotation(state.motion[:, :3], 1 / np.sqrt(np.sum(rate)), turning)
 
 
 def require_together(

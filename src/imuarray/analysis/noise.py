@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.analysis.model import Notify, silent
+from imuarray.analysis.model import Notify, require_motion, require_seen, silent
 from imuarray.analysis.settings import SETTINGS
 from imuarray.engine.estimate import Recorded, estimate
 from imuarray.engine.linearise import CHUNK, State, chunk_at
@@ -99,11 +99,17 @@ class Mode(NamedTuple):
 
 
 def as_declared(recording: Recording) -> tuple[Readings, Columns]:
-    """All samples with the noise that the recording declares, and the positions as parameters."""
+    """All samples with the noise that the recording declares, and the positions as parameters.
+
+    IdentifiabilityError where the gyroscopes do not see each sample's rate, or turns have one axis.
+    """
     model, prior_sd = model_of(recording), recording.position_prior_sd
     data = recording.specific_force, recording.angular_rate, recording.saturated_gyroscopes()
     readings = replace(measured(model, *data), position_prior_sd=prior_sd)
-    return readings, columns_of(model.array, (), prior_sd)
+    columns = columns_of(model.array, (), prior_sd)
+    require_seen(readings)
+    require_motion(readings, start(readings, columns))
+    return readings, columns
 
 
 def mode_of(readings: Readings, columns: Columns, begin=None) -> Mode:
@@ -131,7 +137,7 @@ def _mode_from(readings: Readings, columns: Columns, begin) -> Mode:
         ])  # fmt: skip
         state = state._replace(positions=begin, motion=motion)
     begun = [Recorded(readings, state, smooth=False)]
-    found = estimate(begun, columns, columns.mask([POSITION]), noise="given")
+    found = estimate(begun, columns, columns.mask([POSITION]), noise="fixed")
     off = found.values - columns.prior_means()[found.active]
     cost = np.sum(found.residuals[0].squares) + off @ found.precision @ off
     covariance = scaled_inverse(found.information + found.precision)

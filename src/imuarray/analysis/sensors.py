@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis import methods
-from imuarray.analysis.model import Notify, silent
+from imuarray.analysis.model import Notify, require_motion, silent
 from imuarray.engine.dataset import engine_dataset, with_readings
 from imuarray.engine.estimate import Estimate, Recorded, estimate
 from imuarray.engine.forward import EffectGroup, groups_of, resumed, select_forward, with_effects
@@ -71,9 +71,9 @@ def fitted(
             return again(recordings[0], load_dataset(Path(model)), notify), []
         except InputError as error:
             raise InputError(f"--model {model}: {error}") from None
-    readings = [used(one, notify) for one in recordings]
     if model == "papers":
-        return positions_alone(readings[0]), []
+        return positions_alone(used(recordings[0], None)), []
+    readings = [used(one, notify) for one in recordings]
     if effects:
         return with_effects(readings, effects), []
     if not plain and not groups_of(readings):
@@ -92,9 +92,10 @@ def positions_alone(readings: Readings) -> Estimate:
     IdentifiabilityError where triads or motion leave a direction of the positions open.
     """
     require_planar_extent(readings.array.positions, "recording")
-    columns = columns_of(readings.array, (), np.inf)
+    columns = columns_of(readings.array, (), 1e3)  # m: none, but for parts that tell nothing
     begun = Recorded(readings, start(readings, columns), smooth=False)
-    found = estimate([begun], columns, columns.mask([POSITION]), noise="given")
+    require_motion(readings, begun.state)
+    found = estimate([begun], columns, columns.mask([POSITION]), noise="fixed")
     if not scaled_eigh(found.information)[0][0] > FLOOR:
         raise IdentifiabilityError(
             "calibration: expected informative motion, found a direction of the positions that the"
@@ -139,10 +140,14 @@ def again(recording: Recording, calibration: xr.Dataset, notify: Notify = silent
     return resumed(readings, columns, active & columns.owner, state)
 
 
-def used(recording: Recording, notify: Notify = silent) -> Readings:
-    """The moving samples that a board is estimated from; InputError where there are none."""
+def used(recording: Recording, notify: Notify | None = silent) -> Readings:
+    """The moving samples that a board is estimated from; InputError where there are none.
+
+    Of a long recording the most informative ones, which ``notify`` is told; without it all.
+    """
     readings = arrange(recording, sparse=True)
-    found = most_informative(readings.select(determined(readings, 1)), notify)
+    found = readings.select(determined(readings, 1))
+    found = found if notify is None else most_informative(found, notify)
     rate = 1 / np.median(np.diff(recording.time)) if len(recording.time) > 1 else 0.0
     none = f"none, at {rate:.4g} samples a second; is the unit of time right?"
     require(len(found.time), "recording", "samples that determine the motion", none)

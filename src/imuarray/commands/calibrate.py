@@ -74,7 +74,10 @@ def _misfit(dataset: xr.Dataset) -> list[str]:
             f" smooth samples that turn fast, {ratio:.3g} over all: shocks are faster"
             " than the samples, and count little"
         ]
-    allowed = "are too small, by that or more" if papers else "take it for noise"
+    allowed = "take it for noise"
+    if papers:
+        blocks = "position_sd_jackknife" in dataset
+        allowed = "are too small" + ("" if blocks else ", by that or more")
     return [
         f"residual {ratio:.3g} times the declared noise: the model misses something, and the"
         f" sds above {allowed}"

@@ -8,7 +8,7 @@ Effects that a recording has of its own (biases, clocks) have parameters in each
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import NamedTuple, Self
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -75,6 +75,7 @@ class Estimate:
     freedoms: np.ndarray
     steps: tuple[float, ...]
     converged: bool
+    unpaid: int = 0  # parameters that no estimate of noise has allowed for
     # by kind of sensor: chance that the correction's maps hold in this motion, the farthest IMUs
     maps_hold: dict[str, tuple[float, list[int]]] = field(default_factory=dict)
 
@@ -100,7 +101,7 @@ class Estimate:
             scale = (one.readings.sd / one.readings.declared) ** 2
             squares += np.sum(seen.distance * scale)
             number += seen.number.sum()
-        return float(np.sqrt(squares / number))
+        return float(np.sqrt(squares / max(number - self.unpaid, 1e-3)))
 
     def smooth_ratio(self) -> np.ndarray | None:
         """Where motion is rough: (N, 2) the same of each triad in the smooth samples, robust.
@@ -157,13 +158,14 @@ def _spared(share) -> np.ndarray:
 
 
 def estimate(
-    recorded: Sequence[Recorded], columns: Columns, active, noise: str = "robust",
+    recorded: Sequence[Recorded], columns: Columns, active,
+    noise: Literal["robust", "normal", "fixed"] = "robust",
     steps: int = SETTINGS.iterations,
 ) -> Estimate:  # fmt: skip
     """The most likely parameters from where the recordings stand.
 
-    ``active`` (N, m) bool. ``noise``: "robust" is Student's t, its degrees of freedom and each
-    triad's scale estimated; "normal" is estimated, too; "given" is normal, of the readings' sds.
+    ``active`` (N, m) bool. ``noise``: "robust" Student's t, degrees of freedom and each triad's
+    scale estimated; "normal" each triad's sd estimated; "fixed" normal, of the readings' own sds.
     ``steps``: at most. LinAlgError where the readings do not determine the motion.
     """
     active = columns.movable(active, [one.state for one in recorded])
@@ -171,8 +173,8 @@ def estimate(
     nu, length, moved, tails, trail, near = NORMAL, 1.0, [], [], [], False
     # from a former estimate: readings far out have little weight as it is
     weighted = all(one.readings.trust is not None for one in recorded)
-    first = 0 if weighted or noise == "given" else SETTINGS.robust_first
-    enough = SETTINGS.exact if noise == "given" else SETTINGS.settled
+    first = 0 if weighted or noise == "fixed" else SETTINGS.robust_first
+    enough = SETTINGS.exact if noise == "fixed" else SETTINGS.settled
     for number in range(steps):
         far = number < first
         linear, seen = _linearised(recorded, columns, active, int(far))
@@ -182,7 +184,7 @@ def estimate(
             tails.append(nu)
             nu = steady(tails)
         # before the equations: weights of a step before would halve the pace
-        if noise == "given":
+        if noise == "fixed":
             change = 0.0
         else:
             recorded, seen, change = _judged(recorded, linear, seen, columns, active, nu)
@@ -194,7 +196,7 @@ def estimate(
         precision = pinned(columns, active, places, shown=shown(recorded))
         slope = score - precision @ (values - means(recorded, columns, active, places))
         step, sds = scaled_solve(information + precision, slope)
-        if noise != "given":
+        if noise != "fixed":
             sds = np.maximum(sds, jackknifed(information, precision, blocks))
         trail = [*trail, step / sds]
         length = paced(length, trail)
@@ -210,7 +212,7 @@ def estimate(
         trail = trail if farther == 1.0 else []
     return Estimate(
         recorded, seen, columns, active, places, information, precision, blocks, nu,
-        tuple(moved), near,
+        tuple(moved), near, len(score) if noise == "fixed" else 0,
     )  # fmt: skip
 
 

@@ -54,7 +54,7 @@ class Settings:
     same_pace: float = 0.1  # by which their shares of the one before may differ
     same_way: float = 0.03  # of one, that may be across
     settled: float = 0.05  # of a parameter's sd, a jackknife's where larger: shorter steps end it
-    exact: float = 1e-4  # the same, where noise is given: a likelihood's own maximum
+    exact: float = 1e-4  # the same, where noise is fixed: a likelihood's own maximum
     same_noise: float = 0.005  # relative change of a noise sd below which it is the same
     dense: float = 0.5  # share of samples in gapless runs from which neighbours are looked at
     longest_step: float = 0.025  # s, between neighbours: longer ones say nothing of derivatives
