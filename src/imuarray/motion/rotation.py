@@ -1,4 +1,4 @@
-"""Whether a motion turns enough, and about enough axes, to determine positions (paper 2017)."""
+"""Motion that turns too little, or about one axis, to determine positions (paper 2017)."""
 
 from collections.abc import Callable
 
