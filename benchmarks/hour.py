@@ -22,8 +22,9 @@ from imuarray_papers.config import model_from, read_config
 
 RATE = 1000.0  # Hz
 COMMANDS = {
-    "select": "select recording.nc --samples 500 --out few.nc",
-    "calibrate": "calibrate few.nc --out cal.nc",
+    "select": "select recording.nc --out few.nc",
+    "select --samples 500": "select recording.nc --samples 500 --out some.nc",
+    "calibrate": "calibrate some.nc --out cal.nc",
     "apply": "apply cal.nc recording.nc --out motion.nc",
 }
 

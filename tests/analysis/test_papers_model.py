@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import imuarray
+from imuarray.analysis import noise
 from imuarray.engine.parameters import model_of
-from imuarray.errors import IdentifiabilityError
+from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.geometry import sub_array
 from imuarray.motion.state import Motion
 from imuarray.simulation.recordings import measure
@@ -72,3 +73,13 @@ def test_two_triads_are_refused():
     recording, _ = imuarray.simulate(sub_array(imuarray.mimu4444(), 2), 1.0, 50.0, seed=1)
     with pytest.raises(IdentifiabilityError, match="at least 3 accelerometer triads"):
         imuarray.calibrate(recording, "papers")
+
+
+def test_readings_far_from_the_model_are_bad_input(monkeypatch):
+    def diverges(*_, **__):
+        raise np.linalg.LinAlgError("singular")
+
+    recording, _ = imuarray.simulate(sub_array(imuarray.mimu4444(), 4), 1.0, 50.0, seed=1)
+    monkeypatch.setattr(noise, "estimate", diverges)
+    with pytest.raises(InputError, match="a search that diverges"):
+        imuarray.sample(recording, "papers")

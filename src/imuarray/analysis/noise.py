@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.analysis.model import Notify, require_motion, require_seen, silent
+from imuarray.analysis.sensors import near_the_model
 from imuarray.analysis.settings import SETTINGS
 from imuarray.engine.estimate import Recorded, estimate
 from imuarray.engine.linearise import CHUNK, State, chunk_at
@@ -144,6 +145,7 @@ def _mode_from(readings: Readings, columns: Columns, begin) -> Mode:
     return Mode(found.positions, covariance, found.recorded[0].state, float(cost), found.converged)
 
 
+@near_the_model()
 def estimated_noise(
     recording: Recording, known: bool = False, notify: Notify = silent
 ) -> tuple[Readings, Mode, NoiseEstimate]:

@@ -44,7 +44,7 @@ def calibrate_sensors(
 
 
 @contextmanager
-def _near_the_model() -> Iterator[None]:
+def near_the_model() -> Iterator[None]:
     """A search that diverges is bad input, in one line."""
     try:
         yield
@@ -56,7 +56,7 @@ def _near_the_model() -> Iterator[None]:
         ) from error
 
 
-@_near_the_model()
+@near_the_model()
 def fitted(
     recordings: Sequence[Recording], model: str, effects: Sequence[str], notify: Notify,
     plain: bool = True,

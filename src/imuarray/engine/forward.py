@@ -240,6 +240,7 @@ class Selected(NamedTuple):
             whole = found.columns.flat(one.state)
             if {OWN, LAG} <= self.kept.keys():
                 late = np.sum(whole * (gone & self._first(DELAYS)), axis=1, keepdims=True)
+                late *= (self.active & self._first(OWN)).any(axis=1, keepdims=True)
                 whole += late * (self.active & (self._first(OWN) | self._first(LAG)))
             whole[gone] = 0.0
             recorded.append(replace(one, state=found.columns.unflat(one.state, whole)))
