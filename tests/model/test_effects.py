@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from imuarray.engine.readings import measured
 from imuarray.errors import InputError
 from imuarray.geometry import mimu4444_corners
 from imuarray.model import EFFECTS, ArrayModel, Noise
+from imuarray.model.array_model import _predict_many
 from imuarray.model.effects import effect
 from imuarray.motion import Motion, hand_twisting
 from imuarray.posterior.prior import GaussianPrior
@@ -123,3 +125,20 @@ def test_models_with_different_derivative_priors_do_not_share_compiled_code():
     one = ArrayModel(array, noise, ("sensor_delay",), (1e4, 100.0))
     two = ArrayModel(array, noise, ("sensor_delay",), (2e4, 100.0))
     assert one != two and hash(one) != hash(two)
+
+
+def test_boards_turned_otherwise_share_compiled_code_and_have_their_own_axes():
+    """Each recording's first order estimates its axes: another must not compile all again."""
+    array, rng = mimu4444_corners(), np.random.default_rng(3)
+    values = rng.normal(size=72)
+    motion = Motion(*rng.normal(size=(5, 4, 3)))
+    counts = []
+    for turns in Rotation.random(16, random_state=3).as_matrix().reshape(2, 8, 3, 3):
+        model = ArrayModel.isotropic(replace(array, axes=turns), 0.04, RATE, ("size_effect",))
+        seen = model.predict_many(motion, array.relative, values)
+        counts.append(_predict_many._cache_size())
+        for t in range(4):
+            now = Motion(*(field[t] for field in motion))
+            alone = model.predict(now, array.relative, values)
+            np.testing.assert_allclose(seen.specific_force[t], alone.specific_force, rtol=1e-12)
+    assert counts[0] == counts[1]

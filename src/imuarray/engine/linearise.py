@@ -178,7 +178,7 @@ def _with_slopes(function, x):
     return value, slopes
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2))
+@partial(jax.jit, static_argnums=(1, 2))
 def _predicted(model, count, slopes, x, extra, time, span, positions, parameters):
     def one(x, extra, time):
         def at(x):
@@ -189,7 +189,7 @@ def _predicted(model, count, slopes, x, extra, time, span, positions, parameters
     return jax.vmap(one)(x, extra, time)
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2))
+@partial(jax.jit, static_argnums=(1, 2))
 def _chunk(model, count, placed, x, extra, time, span, positions, parameters, data):
     """Whitened residual, its derivatives by the motion and by all columns.
 

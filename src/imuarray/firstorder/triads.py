@@ -112,10 +112,12 @@ class TriadFit:
 
 def _unpack(p, triads, poses):
     """(matrices (A, 3, 3), offsets (R, A, 3), directions (P, 3) not normalised) from the flat p."""
-    whole = jnp.insert(p, np.array(GONE), 0.0)
-    parts = jnp.split(whole, [9 * triads, len(whole) - 3 * poses])
-    shapes = (triads, 3, 3), (-1, triads, 3), (poses, 3)
-    return [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]
+    # slices and methods alone: the same for NumPy, for which JAX would compile each step by itself
+    known = 9 * triads - len(GONE)
+    there, place = (np.insert(x, GONE, 0) for x in (np.ones(known), np.arange(known)))
+    matrices = (p[place] * there).reshape(triads, 3, 3)
+    offsets, directions = p[known : len(p) - 3 * poses], p[len(p) - 3 * poses :]
+    return matrices, offsets.reshape(-1, triads, 3), directions.reshape(poses, 3)
 
 
 def _predicted(p, triads, magnitude, recording):
@@ -168,7 +170,7 @@ def turns_of(mean, labels) -> np.ndarray:
 
 def _lengths(p, poses):
     """Fixes the directions' free lengths at 1; zero at the solution, so it costs nothing."""
-    return jnp.sum(p[-3 * poses :].reshape(-1, 3) ** 2, axis=1) - 1.0
+    return (p[-3 * poses :].reshape(-1, 3) ** 2).sum(axis=1) - 1.0
 
 
 _predict = jax.jit(_predicted, static_argnums=1)
@@ -255,7 +257,7 @@ def _offset_of(own: Fitted, triads: int, number: int) -> tuple[np.ndarray, np.nd
 
 def _result(own: Fitted, used, ratio: float, walk, doubtful) -> TriadFit:
     poses, triads = used.shape
-    matrices, _, directions = (np.asarray(x) for x in _unpack(own.values, triads, poses))
+    matrices, _, directions = _unpack(own.values, triads, poses)
     offset, covariance = _offset_of(own, triads, 0)
     direction = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     return TriadFit(

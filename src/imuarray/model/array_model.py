@@ -1,8 +1,8 @@
 """The array's measurement model: geometry, noise and a list of effects; its derivatives by them."""
 
 import math
-from dataclasses import dataclass
-from functools import cache, cached_property, partial
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from typing import Self
 
 import numpy as np
@@ -158,6 +158,11 @@ class ArrayModel:
             return clock(time)
         return np.asarray(time, float) - self.clock[0], self.clock[1]
 
+    @cached_property
+    def unturned(self) -> Self:
+        """The model with its sensors' axes along the array's."""
+        return replace(self, array=replace(self.array, axes=None))
+
     @property
     def _function(self) -> tuple:
         """All that `predict` and the compiled residuals depend on, noise excepted."""
@@ -179,7 +184,15 @@ def clock(time) -> tuple[np.ndarray, float]:
     return since, float(np.max(since)) or 1.0
 
 
-@partial(jax.jit, static_argnums=0)
+# An argument of what is compiled: its sensors' axes, which each recording's first order estimates,
+# are data there; all else is part of the function.
+jax.tree_util.register_pytree_node(
+    ArrayModel, lambda model: ((model.array.turns,), model.unturned),
+    lambda model, axes: replace(model, array=replace(model.array, axes=axes[0])),
+)  # fmt: skip
+
+
+@jax.jit
 def _predict_many(model, motion, positions, parameters, time, span):
     def at(motion, time, positions, parameters):
         return model.predict(motion, positions, parameters, time=time, span=span)
