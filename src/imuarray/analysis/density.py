@@ -1,8 +1,6 @@
 """The posterior density of a recording's positions: noise, motion's prior, likelihood, mode."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -166,15 +164,9 @@ def prior_of(recording: Recording, model: ArrayModel) -> GaussianPrior:
     return GaussianPrior.of(mean, sd)
 
 
-@cache
-def log_extended(model: ArrayModel) -> Callable:
-    """Log density under a model with effects; one function for models that predict the same."""
-
-    def log_density(theta, data, mean, root):
-        prior = -0.5 * ((root @ (theta - mean)) ** 2).sum()
-        return log_laplace(model, theta, data) + prior
-
-    return log_density
+def log_extended(theta, model: ArrayModel, data, mean, root):
+    """Log density under a model with effects."""
+    return log_laplace(model, theta, data) - 0.5 * ((root @ (theta - mean)) ** 2).sum()
 
 
 def traced(posterior: Posterior, notify: Notify = silent):
@@ -185,7 +177,7 @@ def traced(posterior: Posterior, notify: Notify = silent):
     if prior.root is not None:
         assert posterior.readings is not None  # there are, with effects
         given = unknown(posterior.readings, posterior.motion, spread)
-        return log_extended(posterior.model), (given, prior.mean, prior.root)
+        return log_extended, (posterior.model, given, prior.mean, prior.root)
     found = _marginal(posterior, posterior.motion)
     if found.gap > SETTINGS.node_gap:
         notify("gyroscopes that see little of the motion: the likelihood is good to"
