@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import argrelextrema, correlate
 
 from imuarray.alignment.resample import Sensor, Splines
 from imuarray.alignment.settings import SETTINGS
@@ -188,6 +187,8 @@ def _speed(sensor: Sensor) -> tuple[np.ndarray, float]:
 
 def _match(base, part) -> np.ndarray:
     """Correlation of ``part`` with each piece of ``base`` as long as it is."""
+    from scipy.signal import correlate  # slow to import, and every log comes by here
+
     count, part = len(part), part - part.mean()
     base = base - base.mean()
     sums = np.cumsum(np.concatenate([[0.0], base]))
@@ -203,6 +204,8 @@ def _placed(base, speed, length: int, zero: float, name: str) -> tuple[int, int]
 
     Of places that fit equally well the one where the stamps agree best.
     """
+    from scipy.signal import argrelextrema  # as in `_match`
+
     hop, best = max(length // 4, 1), 0.0
     begins = np.arange(0, len(speed) - length + 1, hop)
     spread = np.array([speed[b : b + length].std() for b in begins])

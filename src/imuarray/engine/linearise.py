@@ -304,12 +304,15 @@ def chunk_at(readings: Readings, columns: Columns, state: State, directions, sta
 def whitened_at(readings: Readings, columns: Columns, state: State, directions, start) -> Whitened:
     """The samples of `chunk_at`, the motion not eliminated."""
     index, used = padded(start, len(readings.values)), slice(0, len(readings.values) - start)
-    x, extra, _ = _rows_of(readings, state, index)
+    rows = _run_of(index)
+    x, extra, _ = _rows_of(readings, state, rows)
     placed = bool(np.all(directions < columns.of(POSITION).size)) or not columns.model.chain
+    model, parameters = columns.model, state.parameters
+    if placed and not parameters.any():  # the same readings, several times as fast
+        model, parameters = model.plain, parameters[:0]
     made = _chunk(
-        columns.model, readings.values.shape[1], placed, x, extra, readings.time[index],
-        readings.span, state.positions, state.parameters,
-        (readings.values[index], readings.weights_of(index)),
+        model, readings.values.shape[1], placed, x, extra, readings.time[rows], readings.span,
+        state.positions, parameters, (readings.values[rows], readings.weights_of(rows)),
     )  # fmt: skip
     residual, motion, whitened = (np.asarray(part)[used] for part in made)
     if len(directions) < whitened.shape[-1]:
@@ -322,7 +325,7 @@ def eliminated(readings: Readings, state: State, chunk: Whitened) -> Eliminated:
 
     A prior of the motion's last k numbers, its sd infinite where it has none.
     """
-    x, _, (mean, sd) = _rows_of(readings, state, chunk.index)
+    x, _, (mean, sd) = _rows_of(readings, state, _run_of(chunk.index))
     away = (mean - x[:, x.shape[1] - sd.shape[1] :]) / sd
     prior_slope = np.zeros((len(x), 0, *chunk.columns[:, :, 0].shape[1:]))
     if state.turning is not None and state.turning.follows.any():
@@ -348,19 +351,25 @@ def padded(start: int, samples: int) -> np.ndarray:
     return np.minimum(np.arange(start, start + CHUNK), samples - 1)
 
 
+def _run_of(index):
+    """Indices of one run of samples as a slice, whose rows are not copied; others as they are."""
+    whole = index[-1] - index[0] == len(index) - 1
+    return slice(index[0], index[-1] + 1) if whole else index
+
+
 def _rows_of(readings: Readings, state: State, index):
-    """(motion, derivatives, the motion's prior) of the samples ``index``."""
+    """(motion, derivatives, the motion's prior) of the samples ``index``, a run or any."""
     whole = *state.derivatives, readings.clock_deviations
     extra = jax.tree.map(lambda field: field[index], whole)
-    nothing = np.zeros((len(index), 0))
-    prior = (nothing, nothing)
+    motion = state.motion[index]
+    prior = 2 * (np.zeros((len(motion), 0)),)
     if state.rough_prior is not None:
         prior = state.rough_prior.mean[index], state.rough_prior.sd[index]
     if state.turning is not None:
-        free = np.zeros((len(index), 3)), np.full((len(index), 3), np.inf)  # of s
+        free = np.zeros((len(motion), 3)), np.full((len(motion), 3), np.inf)  # of s
         parts = zip((part[index] for part in state.turning[:2]), free, prior, strict=True)
         prior = tuple(np.hstack(part) for part in parts)
-    return state.motion[index], extra, prior
+    return motion, extra, prior
 
 
 def motion_equations(readings: Readings, model: ArrayModel, state: State, index, rails=None):

@@ -166,6 +166,11 @@ class ArrayModel:
         """The model with its sensors' axes along the array's."""
         return replace(self, array=replace(self.array, axes=None))
 
+    @cached_property
+    def plain(self) -> Self:
+        """The model without effects."""
+        return replace(self, effects=())
+
     @property
     def _function(self) -> tuple:
         """All that `predict` and the compiled residuals depend on, noise excepted."""
