@@ -10,8 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special as special
 
-from imuarray.diagnosis.fit import Fit, normal_blocks
+from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.engine.heldout import blocks_of
+from imuarray.engine.normal import score_of
 from imuarray.engine.parameters import Columns
 from imuarray.linear import scaled_eigh, scaled_inverse
 from imuarray.model.array_model import component, unit_of
@@ -214,7 +216,8 @@ def detectable(search) -> dict[str, dict]:
     inside = {part for c in search.causes for part in EFFECTS[c.effect].contains}
     effects = [effect for effect in search.offered if effect not in inside]
     every = candidates(columns, search.readings.exists, effects)
-    scores = np.array([score for _, score in normal_blocks(search.fit, search.fit.described)])
+    fit, blocks = search.fit, blocks_of(len(search.fit.residual))
+    scores = np.array([score_of(fit, fit.described[:, fit.wanted], block) for block in blocks])
     found: dict[str, dict] = {}
     for candidate in every:
         mask = candidate.mask(columns)

@@ -80,5 +80,5 @@ def saved(figure: Figure, suffix: str = "png") -> bytes:
     buffer = io.BytesIO()
     metadata = {"pdf": {"CreationDate": None}, "png": {"Software": None}}[suffix]
     figure.savefig(buffer, format=suffix, metadata=metadata)
-    figure.set_layout_engine("none")  # laid out once
+    figure.set_layout_engine(None)  # laid out once
     return buffer.getvalue()
