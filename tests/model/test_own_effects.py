@@ -10,8 +10,9 @@ import xarray as xr
 import imuarray
 from imuarray import provenance
 from imuarray.cli import main
-from imuarray.model import DATA_EFFECTS, EFFECTS
+from imuarray.model import DATA_EFFECTS, EFFECTS, ArrayModel
 from imuarray.model import effects as own
+from imuarray.motion import Motion
 from tests.cases import model
 
 CUBIC = '''
@@ -97,6 +98,28 @@ def test_a_file_whose_effects_nobody_asks_for_is_said(mine, tmp_path, capsys):
     assert "expected --effects" in capsys.readouterr().err
     with pytest.raises(imuarray.InputError, match="expected a Python file"):
         imuarray.read_effects(tmp_path / "nothing.py")
+
+
+def test_another_text_is_compiled_anew(mine):
+    """As a notebook's cell is run again: what is compiled for one text is not another's."""
+
+    def seen(name):
+        made = ArrayModel.isotropic(model().array, 0.04, 1e-3, (name,))
+        motion = Motion(*np.ones((5, 2, 3)))
+        both = [one.predict_many(motion, made.array.relative, np.ones(15)) for one in (made, first)]
+        return [part.specific_force[0, 0] for part in both]
+
+    imuarray.read_effects(mine)
+    first = ArrayModel.isotropic(model().array, 0.04, 1e-3, ("accelerometer_cubic",))
+    one, before = seen("accelerometer_cubic")
+    mine.write_text(CUBIC.format(sd="2e-6").replace("curvature * force", "2 * curvature * force"))
+    imuarray.read_effects(mine)
+    two, still = seen("accelerometer_cubic")
+    np.testing.assert_allclose((two - 1.0) / (one - 1.0), 2.0)
+    np.testing.assert_array_equal(before, still)  # a model that was made keeps its effects
+    mine.write_text(CUBIC.replace("accelerometer_cubic", "accelerometer_other").format(sd="2e-6"))
+    imuarray.read_effects(mine)
+    np.testing.assert_array_equal(seen("accelerometer_other")[0], one)
 
 
 def test_another_text_makes_other_chains(mine):

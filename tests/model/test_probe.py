@@ -61,6 +61,23 @@ WRONG = {
         {},
         "finite derivatives",
     ),
+    "guarded outside": (
+        lambda v, i, p: p._replace(angular_rate=p[1] + jnp.where(v > 0, jnp.exp(-1 / v), 0.0)),
+        {},
+        "backwards.*found NaN",
+    ),
+    "a loop up to a value": (
+        lambda v, i, p: p._replace(
+            angular_rate=jax.lax.fori_loop(0, jnp.int32(9 * i.time), lambda _, x: x + v, p[1])
+        ),
+        {},
+        "backwards",
+    ),
+    "an if on axes": (
+        lambda v, i, p: scaled(v, i, p) if np.allclose(i.axes[0], np.eye(3)) else p,
+        {},
+        "in jax.numpy",
+    ),
     "later a neighbour's": (
         lambda v, i, p: p._replace(
             angular_rate=p[1] + jnp.where(i.time > 0.5, jnp.roll(v, 1, axis=0), v)

@@ -352,7 +352,7 @@ def padded(start: int, samples: int) -> np.ndarray:
 
 
 def _run_of(index):
-    """Indices of one run of samples as a slice, whose rows are not copied; others as they are."""
+    """`padded` indices as a slice, whose rows are not copied, where none is repeated."""
     whole = index[-1] - index[0] == len(index) - 1
     return slice(index[0], index[-1] + 1) if whole else index
 

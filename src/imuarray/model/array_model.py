@@ -161,10 +161,16 @@ class ArrayModel:
             return clock(time)
         return np.asarray(time, float) - self.clock[0], self.clock[1]
 
+    def turned(self, axes) -> Self:
+        """With other axes of its sensors; its effects stay, whatever is registered since."""
+        found = replace(self, array=replace(self.array, axes=axes))
+        found.__dict__["chain"] = self.chain
+        return found
+
     @cached_property
     def unturned(self) -> Self:
         """The model with its sensors' axes along the array's."""
-        return replace(self, array=replace(self.array, axes=None))
+        return self.turned(None)
 
     @cached_property
     def plain(self) -> Self:
@@ -174,15 +180,14 @@ class ArrayModel:
     @property
     def _function(self) -> tuple:
         """All that `predict` and the compiled residuals depend on, noise excepted."""
-        counts = self.array.accelerometers, self.array.gyroscopes
-        axes = None if self.array.axes is None else self.array.axes.tobytes()
-        return (*counts, axes, self.chain, self.derivative_sd, self.motion_sd)
+        counts, axes = (self.array.accelerometers, self.array.gyroscopes), self.array.turns
+        return (*counts, axes.tobytes(), self.chain, self.derivative_sd, self.motion_sd)
 
     def __hash__(self):
         return hash(self._function)
 
     def __eq__(self, other):
-        """Equal where `predict` is the same function, which is what compilation keys on."""
+        """Equal where `predict` is the same function; to compilers axes are data."""
         return isinstance(other, ArrayModel) and self._function == other._function
 
 
@@ -196,7 +201,7 @@ def clock(time) -> tuple[np.ndarray, float]:
 # are data there; all else is part of the function.
 jax.tree_util.register_pytree_node(
     ArrayModel, lambda model: ((model.array.turns,), model.unturned),
-    lambda model, axes: replace(model, array=replace(model.array, axes=axes[0])),
+    lambda model, axes: model.turned(axes[0]),
 )  # fmt: skip
 
 

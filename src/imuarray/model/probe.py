@@ -35,13 +35,14 @@ def _probe(item: Effect, sd, rng, where: str) -> bool:
     positions = jnp.asarray(0.01 * rng.standard_normal((ACCELEROMETERS, 3)))
     fields = [jnp.asarray(scale * rng.standard_normal(3)) for scale in (5, 100, 10, 1e3, 1e2)]
 
-    def predicted(parameters, later, plain=plain, positions=positions, time=0.3):
+    axes = np.tile(np.eye(3), (ACCELEROMETERS, 1, 1))
+
+    def predicted(parameters, later, plain=plain, positions=positions, time=0.3, axes=axes):
         motion = Motion(*fields[:3], *later)
         instant = Instant(motion, positions, time=time, span=1.0, axes=axes)
         return item.apply(jnp.asarray(parameters), instant, plain)
 
     later = tuple(fields[3:])
-    axes = np.tile(np.eye(3), (ACCELEROMETERS, 1, 1))
     _require_gauge(item, sd.shape, axes, where)
     function = f"a function of (parameters {sd.shape}, instant, predicted) in jax.numpy"
     with running(where, function):
@@ -58,10 +59,12 @@ def _probe(item: Effect, sd, rng, where: str) -> bool:
     drawn = sd * rng.standard_normal(sd.shape)
     with running(where, function):
         # as it is used: compiled, where numpy's functions and a Python `if` on values fail
-        jax.eval_shape(lambda x: predicted(x, later), drawn)
+        jax.eval_shape(lambda x, r: predicted(x, later, axes=r), drawn, axes)
         values, change = jax.jvp(lambda x: predicted(drawn, x), (later,), (later,))
     finite = all(np.all(np.isfinite(part)) for part in values)
     require(finite, where, "finite readings at parameters within their prior", "NaN or infinite")
+
+    _require_backwards(lambda x, t: predicted(x, later, time=t), (np.zeros(sd.shape), drawn), where)
 
     def slopes(time):
         by = jax.jacfwd(lambda x, y, r: predicted(x, later, y, r, time), argnums=(0, 1, 2))
@@ -112,6 +115,16 @@ def _require_gauge(item: Effect, shape, axes, where: str) -> None:
         shapes = {np.shape(own) for own in item.gauge(shape, axes)} if item.gauge else set()
     wrong = shapes - {shape}
     require(not wrong, where, expected, next(iter(wrong), None))
+
+
+def _require_backwards(function, values, where: str) -> None:
+    """InputError unless a function of parameters and time has finite derivatives, from behind."""
+    expected = "a function that JAX differentiates backwards, with finite derivatives, at zero too"
+    by = jax.jacrev(function)
+    with running(where, expected):
+        jax.eval_shape(by, values[0], 0.3)  # time is traced, too
+        slopes = jax.tree.leaves([by(jnp.asarray(each), 0.3) for each in values])
+    require(all(np.isfinite(x).all() for x in slopes), where, expected, "NaN or infinite")
 
 
 def _require_own(slopes, where: str) -> bool:
