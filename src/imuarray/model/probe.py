@@ -64,15 +64,14 @@ def _probe(item: Effect, sd, rng, where: str) -> bool:
     finite = all(np.all(np.isfinite(part)) for part in values)
     require(finite, where, "finite readings at parameters within their prior", "NaN or infinite")
 
-    _require_backwards(lambda x, t: predicted(x, later, time=t), (np.zeros(sd.shape), drawn), where)
+    def slopes(parameters, time):
+        by = jax.jacrev(lambda x, y, r: predicted(x, later, y, r, time), argnums=(0, 1, 2))
+        return by(jnp.asarray(parameters), plain, positions)
 
-    def slopes(time):
-        by = jax.jacfwd(lambda x, y, r: predicted(x, later, y, r, time), argnums=(0, 1, 2))
-        return by(jnp.asarray(drawn), plain, positions)
-
-    with running(where, function):
-        early, late = slopes(0.3), slopes(0.8)
-    own = [_require_own(each, where) for each in (early, late)]
+    with running(where, f"{function} that is differentiated backwards"):
+        jax.eval_shape(slopes, drawn, 0.3)  # time is traced, too
+        every = slopes(drawn, 0.3), slopes(drawn, 0.8), slopes(np.zeros(sd.shape), 0.3)
+    own = [_require_own(each, where) for each in every]
     declared = item.derivatives or not any(np.any(np.asarray(part) != 0) for part in change)
     expected = "derivatives=True, since it uses omega double dot or s dot"
     require(declared, where, expected, "False")
@@ -117,16 +116,6 @@ def _require_gauge(item: Effect, shape, axes, where: str) -> None:
     require(not wrong, where, expected, next(iter(wrong), None))
 
 
-def _require_backwards(function, values, where: str) -> None:
-    """InputError unless a function of parameters and time has finite derivatives, from behind."""
-    expected = "a function that JAX differentiates backwards, with finite derivatives, at zero too"
-    by = jax.jacrev(function)
-    with running(where, expected):
-        jax.eval_shape(by, values[0], 0.3)  # time is traced, too
-        slopes = jax.tree.leaves([by(jnp.asarray(each), 0.3) for each in values])
-    require(all(np.isfinite(x).all() for x in slopes), where, expected, "NaN or infinite")
-
-
 def _require_own(slopes, where: str) -> bool:
     """InputError where a triad's parameters or readings change another triad's readings.
 
@@ -147,7 +136,7 @@ def _require_own(slopes, where: str) -> bool:
 def _reached(where: str, slope) -> list[tuple[int, int]]:
     """(triad, other) pairs, the other's row in a derivative (triad, axis, other, ...) not zero."""
     slope = np.asarray(slope)
-    expected = "finite derivatives at parameters within their prior"
+    expected = "finite derivatives, taken backwards, at zero and within the parameters' prior"
     require(np.isfinite(slope).all(), where, expected, "NaN or infinite")
     pairs = np.argwhere(np.any(slope != 0, (1, *range(3, slope.ndim))))
     return [(int(triad), int(other)) for triad, other in pairs if triad != other]
