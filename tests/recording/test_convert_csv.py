@@ -18,6 +18,11 @@ def test_a_row_longer_than_the_header_is_refused(tmp_path, extra, which):
         read(tmp_path, rows, layout() | {"time": {"rate": 100.0}})
 
 
+def test_a_header_alone_is_no_log(tmp_path):
+    with pytest.raises(InputError, match="expected rows of readings below the header, found none"):
+        read(tmp_path, table()[:1])
+
+
 def test_a_short_row_is_named(tmp_path):
     rows = table()
     rows[3] = rows[3][:-2]

@@ -30,7 +30,7 @@ from imuarray.errors import InputError
 from imuarray.pictures.board import missing
 from imuarray.report.board import advice, facts, html, noises, turned, verdict, write_board
 from imuarray.trust import of_file, of_first_order, reasons_of_calibration, reasons_of_motion
-from imuarray.words import sentences
+from imuarray.words import lags_apart, sentences
 from tests.browser import in_browser, needs_browser
 
 matplotlib.use("agg")
@@ -364,6 +364,24 @@ def test_a_lag_within_two_sds_is_none():
     alone = {f"delay_{k}": (-6e-3 * (k == 2), 3e-6 * (k == 2)) for k in range(4)}
     (lone,) = sentences("gyroscope_delay", alone, "0123")
     assert lone.startswith("gyroscope 2 is 6.0000")
+
+
+def test_an_imu_that_is_late_lags_in_both_of_its_sensors():
+    """Beside lags of each accelerometer, all are behind the motion."""
+    lags, both = [[7.5e-4]] * 3 + [[-2.25e-3]], ("lag", "delay")
+    one, two = (sizes(lags, (name,), sd=1e-5) for name in both)
+    labels = one[1]
+    found, (said,) = lags_apart({"accelerometer_filter": one[0], "gyroscope_delay": two[0]}, labels)
+    assert said.startswith("IMU 4 is read 3.00") and "ms late" in said
+    (own,) = sentences("gyroscope_delay", found["gyroscope_delay"], labels)
+    assert own.startswith("no lag seen")
+    two = sizes([[7.5e-4]] * 4, ("delay",), sd=1e-5)  # its gyroscope is not
+    found, (said,) = lags_apart({"accelerometer_filter": one[0], "gyroscope_delay": two[0]}, labels)
+    assert said.startswith("accelerometer 4 is read 3.00")
+    assert (
+        "gyroscope 4 is 3.00" in sentences("gyroscope_delay", found["gyroscope_delay"], labels)[1]
+    )
+    assert lags_apart({"gyroscope_delay": two[0]}, labels) == ({"gyroscope_delay": two[0]}, [])
 
 
 def test_filters_are_said_by_what_they_take_of_motion():

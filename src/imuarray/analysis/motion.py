@@ -139,10 +139,11 @@ def _late(calibration: xr.Dataset) -> float:
     """By how much (s) the motion is late for its stamps, by the clock of most IMUs.
 
     What is common to the delays of all IMUs is nowhere seen: their mean is taken for zero. With
-    clocks of their own, the delays are the offsets of these.
+    clocks of their own, the delays are the offsets of these; else accelerometers' own lags are.
     """
     clocks = values_of(calibration, "sensor_clock offset").values()
-    delays = values_of(calibration, "sensor_delay ").values() or [-offset for offset in clocks]
+    lags = values_of(calibration, "accelerometer_filter lag").values()
+    delays = values_of(calibration, "sensor_delay ").values() or [-x for x in clocks] or lags
     return float(np.median([*delays])) if delays else 0.0
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from imuarray.analysis.board import board as answered
 from imuarray.commands.output import Answer, Output
 from imuarray.commands.positions import document, position_lines
+from imuarray.recording.units import GRAVITY
 from imuarray.report import board as said
 from imuarray.report.board import Board, write_board
 
@@ -38,5 +39,10 @@ def lines_on(found: Board, folder: Path) -> list[str]:
     lines += causes[:CAUSES]
     if len(causes) > CAUSES:
         lines.append(f"What else the sensors do ({len(causes) - CAUSES} more) is on the page.")
+    if getattr(found.first_order, "gravity", None) == GRAVITY:
+        lines.append(
+            f"Gravity is taken as {GRAVITY} m/s²: 0.1 % off, it makes the array 0.1 % off;"
+            " `--gravity` is your place's."
+        )
     steps = [f"- {step}" for step in said.advice(found, folder)[:STEPS]]
     return [*lines, "Next:", *steps, f"Page: {folder / 'report.html'}"]

@@ -64,6 +64,7 @@ def load(path, layout, columns) -> tuple[pd.DataFrame, list[str]]:
         table = pd.read_csv(path, skipinitialspace=True, header=header, **options)
         names = head.iloc[0].fillna("").str.strip()
         table.columns = names if header == 0 else [str(k + 1) for k in range(table.shape[1])]
+    require(len(table) > 0, str(path), "rows of readings below the header", "none")
     table, more = written.rows_of_numbers(table)
     table, cut = written.without_cut(table, Path(path))
     return table, [*lines, *(f"{Path(path).name}: {line}" for line in more + cut)]

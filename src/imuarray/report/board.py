@@ -17,7 +17,16 @@ from imuarray.pictures.board import SURE, levelled, missing
 from imuarray.provenance import atomic_folder, trust, write_bytes, write_csv, write_netcdf
 from imuarray.recording import Recording, write_recording
 from imuarray.report.page import PICTURES, pictured, rendered
-from imuarray.words import DEGREE, first_up, meaning, number, plus_minus, quantity, sentences
+from imuarray.words import (
+    DEGREE,
+    first_up,
+    lags_apart,
+    meaning,
+    number,
+    plus_minus,
+    quantity,
+    sentences,
+)
 
 SLOW = np.radians(300.0)  # rad/s rms, of motion that says little of positions
 MISFIT = 1.5  # times the noise: a residual that is looked into
@@ -165,11 +174,10 @@ def causes(calibration: xr.Dataset) -> list[str]:
         for name, value, sd in zip(*columns, strict=True):
             effect, part, _ = str(name).split(" ", 2)
             found.setdefault(effect, {})[part] = value, sd
-    return [
-        f"{first_up(line)}."
-        for effect, values in found.items()
-        for line in sentences(effect, values, labels) or meaning(effect)
-    ]
+    found, said = lags_apart(found, labels)
+    for effect, values in found.items():
+        said += sentences(effect, values, labels) or meaning(effect)
+    return [f"{first_up(line)}." for line in said]
 
 
 def before(board: "Board") -> Iterator[str]:

@@ -7,6 +7,7 @@ from imuarray.words.effects import (
     equation,
     imus_named,
     in_short,
+    lags_apart,
     meaning,
     part_in_words,
     sensors_of,

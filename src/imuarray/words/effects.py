@@ -171,10 +171,34 @@ def _late(sizes: Sizes) -> list[str]:
     values, sds = sizes.values[:, 0], sizes.sds[:, 0]
     # where the mean of all is zero, a delay against the others' mean is larger, its sd as well
     larger = len(values) / max(len(values) - 1, 1) if np.all(sds > 0) else 1.0
-    return _read(sizes.labels, -values, larger * sds)
+    return _read([f"IMU {label}" for label in sizes.labels], -values, larger * sds)
 
 
-def _read(labels, ages, sds) -> list[str]:
+def lags_apart(found: dict[str, dict], labels) -> tuple[dict[str, dict], list[str]]:
+    """({effect: {parameter: (value, sd)}} with each gyroscope's lag behind its own accelerometer,
+    sentences on late ones), where accelerometers have lags of their own.
+
+    Both are behind the motion then: an IMU that is read late has two that are alike.
+    """
+    if not {"gyroscope_delay", "accelerometer_filter"} <= found.keys():
+        return found, []
+    if found.keys() & {"sensor_delay", "sensor_clock"}:  # these say when an IMU is read
+        return found, []
+    lags, other = (
+        np.array([found[effect].get(f"{name}_{label}", (0.0, 0.0)) for label in labels], float)
+        for effect, name in (("accelerometer_filter", "lag"), ("gyroscope_delay", "delay"))
+    )
+    own, sds = other[:, 0] - lags[:, 0], np.hypot(other[:, 1], lags[:, 1])
+    rows = {f"delay_{k}": row for k, row in zip(labels, zip(own, sds, strict=True), strict=True)}
+    apart = standing_out(own, sds)[0]
+    names = [
+        f"{'accelerometer' if far else 'IMU'} {label}"
+        for far, label in zip(apart, labels, strict=True)
+    ]
+    return found | {"gyroscope_delay": rows}, _read(names, -lags[:, 0], lags[:, 1])
+
+
+def _read(names, ages, sds) -> list[str]:
     """Words on IMUs that are read late, by their ages (K,) s at the stamps."""
     if len(ages) < 2:
         return []
@@ -183,7 +207,7 @@ def _read(labels, ages, sds) -> list[str]:
     for k in np.flatnonzero(out):
         way, side = ("late", "before") if ages[k] > usual else ("early", "after")
         said.append(
-            f"IMU {labels[k]} is read {plus_minus(1e3 * abs(ages[k] - usual), 1e3 * sds[k])} ms"
+            f"{names[k]} is read {plus_minus(1e3 * abs(ages[k] - usual), 1e3 * sds[k])} ms"
             f" {way}: it shows the motion that long {side} its stamp"
         )
     rest = ages[~out] - usual
@@ -274,7 +298,8 @@ def _clocks(sizes: Sizes) -> list[str]:
             verb = f"IMU {sizes.labels[int(np.argmax(sure))]} samples on a clock of its own"
         size = quantity(float(np.median(periods[sure])), None, "s")
         said.append(f"{verb}: a reading is up to {size} old, in a sawtooth")
-    return said + _read(sizes.labels, sizes.values[:, age], sizes.sds[:, age])
+    names = [f"IMU {label}" for label in sizes.labels]
+    return said + _read(names, sizes.values[:, age], sizes.sds[:, age])
 
 
 def _turned(kind: str, sizes: Sizes) -> list[str]:
