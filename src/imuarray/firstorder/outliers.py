@@ -39,7 +39,9 @@ def fit_triads(mean, sd, magnitude: float, labels=None, recording=None, time=Non
     IdentifiabilityError
         Where the poses are too few or too alike to determine all parameters.
     """
-    if 0 < (size := np.median(np.linalg.norm(mean, axis=2))) < SETTINGS.gravity_gone * magnitude:
+    size, steady = (np.median(np.linalg.norm(x, axis=-1)) for x in (mean, mean.mean(axis=0)))
+    # what turns with the board is gravity all the same, in another unit
+    if 0 < size < SETTINGS.gravity_gone * magnitude and steady > SETTINGS.gravity_steady * size:
         raise InputError(
             f"still poses: expected gravity in the readings, found {size:.2g} m/s^2: it was taken"
             " out (linear acceleration); log the raw accelerometers"
@@ -54,7 +56,7 @@ def fit_triads(mean, sd, magnitude: float, labels=None, recording=None, time=Non
     if wild.size:
         raise InputError(
             f"still poses: expected specific forces of about {magnitude:g} m/s^2, found"
-            f" {size[wild[0]] * magnitude:.3g} in pose {wild[0] + 1}; are the units right?"
+            f" {size[wild[0]] * magnitude:.3g} in pose {wild[0] + 1}; are unit and --gravity right?"
         )
     given = Poses(mean, magnitude, recording, turns, unit)
     noise = PoseNoise.of(sd, time, recording)
