@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy import stats
 from scipy.linalg import rq
 from scipy.spatial.transform import Rotation
@@ -294,6 +295,8 @@ def test_poses_of_three_seconds_are_found_and_the_longest_is_said(still, count):
         return
     with pytest.raises(InputError, match=r"at least 3 s .* the longest lasts 2\.[3-9] s"):
         still_poses(recording)
+    with pytest.raises(InputError, match="it is corrected already: give it as `convert`"):
+        still_poses(replace(recording, correction=xr.Dataset()))
     assert len(still_poses(recording, shortest=2.0)) == 12
 
 

@@ -218,9 +218,11 @@ def still_poses(recording: Recording, shortest=SETTINGS.shortest) -> list[slice]
         poses = _not_turning(recording, poses)
     if not poses:
         longest = max(lasts, default=0.0) + 2 * half * step * bool(lasts)
+        before = "; it is corrected already: give it as `convert` wrote it"
         raise InputError(
             f"recording: expected still poses of at least {shortest:g} s for the first-order"
             f" calibration, found none; the longest lasts {longest:.2g} s"
+            f"{before if recording.correction is not None else ''}"
         )
     return poses
 
