@@ -423,7 +423,7 @@ def test_a_dead_band_says_nothing_of_noise():
 
 
 def test_gravity_that_was_taken_out_is_named():
-    """Offsets are left, and what an attitude was off by: it does not turn with the board."""
+    """Offsets are left, and what an attitude was off by: of no one size."""
     rng = np.random.default_rng(16)
     mean = 0.3 * directions(3, rng) + 0.1 * rng.standard_normal((15, 3, 3))
     with pytest.raises(InputError, match="gravity .* found 0.3.? m/s.2: it was taken out"):

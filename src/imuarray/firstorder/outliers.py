@@ -39,9 +39,10 @@ def fit_triads(mean, sd, magnitude: float, labels=None, recording=None, time=Non
     IdentifiabilityError
         Where the poses are too few or too alike to determine all parameters.
     """
-    size, steady = (np.median(np.linalg.norm(x, axis=-1)) for x in (mean, mean.mean(axis=0)))
-    # what turns with the board is gravity all the same, in another unit
-    if 0 < size < SETTINGS.gravity_gone * magnitude and steady > SETTINGS.gravity_steady * size:
+    sizes = np.linalg.norm(mean, axis=2)
+    size, alike = np.median(sizes), np.std(sizes) < SETTINGS.gravity_alike * np.mean(sizes)
+    # of one size in all poses and triads it is gravity all the same, in another unit
+    if 0 < size < SETTINGS.gravity_gone * magnitude and not alike:
         raise InputError(
             f"still poses: expected gravity in the readings, found {size:.2g} m/s^2: it was taken"
             " out (linear acceleration); log the raw accelerometers"

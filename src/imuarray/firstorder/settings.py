@@ -36,7 +36,7 @@ class Settings:
     pose_outlier: float = 5.0  # times the median size of a residual
     pose_shared: float = 5.0  # times the median gain of leaving out a pose, its worst triad's not
     gravity_gone: float = 0.07  # of gravity: readings without it; those in g have a tenth
-    gravity_steady: float = 0.7  # of a reading, the part alike in all poses: it does not turn
+    gravity_alike: float = 0.2  # relative sd of sizes in the poses, below which it is there
     gravity_off: float = 0.5  # relative, of a pose's mean specific force from gravity
     poses_left_out: float = 0.2  # of a triad's poses
     pose_nearly: float = 0.5  # of the largest gain: as many triads leave out a reading at once

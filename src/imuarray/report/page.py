@@ -51,8 +51,9 @@ PICTURES = {
         2.4, [partial(pictures.residual_course, kind=kind) for kind in KINDS],
         [f"{kind}_residual" for kind in KINDS],
         "Residual against time",
-        "Of each IMU, in sds of the noise that was declared: 1 is noise. The three largest are"
-        " named. A rise that lasts is something that moved, warmed up or came loose.",
+        "Of each IMU, in sds of the declared noise (after first order, of the still poses'): 1 is"
+        " noise. The three largest are named. A rise that lasts is something that moved, warmed up"
+        " or came loose.",
     ),
 }  # fmt: skip
 OF_RECORDING = ("timeline", "sphere")  # which are of the recording, too

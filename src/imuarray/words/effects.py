@@ -171,7 +171,7 @@ def _late(sizes: Sizes) -> list[str]:
     values, sds = sizes.values[:, 0], sizes.sds[:, 0]
     # where the mean of all is zero, a delay against the others' mean is larger, its sd as well
     larger = len(values) / max(len(values) - 1, 1) if np.all(sds > 0) else 1.0
-    return _read([f"IMU {label}" for label in sizes.labels], -values, larger * sds)
+    return _read(sizes.labels, -values, larger * sds)
 
 
 def lags_apart(found: dict[str, dict], labels) -> tuple[dict[str, dict], list[str]]:
@@ -189,26 +189,26 @@ def lags_apart(found: dict[str, dict], labels) -> tuple[dict[str, dict], list[st
         for effect, name in (("accelerometer_filter", "lag"), ("gyroscope_delay", "delay"))
     )
     own, sds = other[:, 0] - lags[:, 0], np.hypot(other[:, 1], lags[:, 1])
-    rows = {f"delay_{k}": row for k, row in zip(labels, zip(own, sds, strict=True), strict=True)}
-    apart = standing_out(own, sds)[0]
-    names = [
-        f"{'accelerometer' if far else 'IMU'} {label}"
-        for far, label in zip(apart, labels, strict=True)
-    ]
-    return found | {"gyroscope_delay": rows}, _read(names, -lags[:, 0], lags[:, 1])
+    there = np.array([f"delay_{label}" in found["gyroscope_delay"] for label in labels])
+    rows = {f"delay_{labels[k]}": (own[k], sds[k]) for k in np.flatnonzero(there)}
+    alike = there & (np.abs(own - np.median(own[there])) < OUT * sds)
+    whose = np.where(alike, "IMU", "accelerometer")
+    return found | {"gyroscope_delay": rows}, _read(labels, -lags[:, 0], lags[:, 1], whose)
 
 
-def _read(names, ages, sds) -> list[str]:
-    """Words on IMUs that are read late, by their ages (K,) s at the stamps."""
+def _read(labels, ages, sds, whose=None) -> list[str]:
+    """Words on IMUs that are read late, or on triads ``whose``, by ages (K,) s at the stamps."""
+    whose = ["IMU"] * len(labels) if whose is None else whose
     if len(ages) < 2:
         return []
     out, usual = standing_out(ages, sds)
     said = []
     for k in np.flatnonzero(out):
         way, side = ("late", "before") if ages[k] > usual else ("early", "after")
+        size = plus_minus(1e3 * abs(ages[k] - usual), 1e3 * sds[k])
         said.append(
-            f"{names[k]} is read {plus_minus(1e3 * abs(ages[k] - usual), 1e3 * sds[k])} ms"
-            f" {way}: it shows the motion that long {side} its stamp"
+            f"{whose[k]} {labels[k]} is read {size} ms {way}: it shows the motion that long"
+            f" {side} its stamp"
         )
     rest = ages[~out] - usual
     if len(rest) < 2 or np.abs(rest).max() < OUT * np.nanmax(sds):
@@ -298,8 +298,7 @@ def _clocks(sizes: Sizes) -> list[str]:
             verb = f"IMU {sizes.labels[int(np.argmax(sure))]} samples on a clock of its own"
         size = quantity(float(np.median(periods[sure])), None, "s")
         said.append(f"{verb}: a reading is up to {size} old, in a sawtooth")
-    names = [f"IMU {label}" for label in sizes.labels]
-    return said + _read(names, sizes.values[:, age], sizes.sds[:, age])
+    return said + _read(sizes.labels, sizes.values[:, age], sizes.sds[:, age])
 
 
 def _turned(kind: str, sizes: Sizes) -> list[str]:
